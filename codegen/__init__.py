@@ -1,0 +1,1 @@
+"""The controller as C for embedded targets."""

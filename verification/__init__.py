@@ -1,0 +1,1 @@
+"""Checks of the controller against independent truths."""
