@@ -1,0 +1,47 @@
+"""Find a cycle by its shipped name or its file."""
+
+from functools import cache
+from importlib.resources import as_file, files
+from os import PathLike, fspath
+from pathlib import Path
+
+from qpmpc.cycles.breakpoints import read_breakpoints
+from qpmpc.cycles.catalogue import CatalogueEntry, catalogue, cycle_names
+from qpmpc.cycles.cycle import Cycle
+from qpmpc.cycles.read_csv import read_csv
+from qpmpc.errors import InputError
+
+
+def load_cycle(name_or_path: str | PathLike[str]) -> Cycle:
+    """Load a shipped cycle by its name, or a user's CSV file by its path.
+
+    The columns of a CSV file are ``time_s,speed_mps[,grade]``; see `read_csv`.
+
+    Parameters
+    ----------
+    name_or_path
+        One of `cycle_names`, or a file. A shipped name wins over a file of that name.
+
+    Raises
+    ------
+    InputError
+        If it is neither, or the file cannot be used; one line says why and what is allowed.
+    """
+    name = fspath(name_or_path)
+    for entry in catalogue():
+        if entry.name == name:
+            return _shipped(entry)
+    path = Path(name)
+    if not path.exists() and path.suffix == "" and path.name == name:
+        raise InputError(
+            f"unknown cycle {name!r}: give one of {', '.join(cycle_names())}, or a CSV file"
+        )
+    return read_csv(path)
+
+
+@cache
+def _shipped(entry: CatalogueEntry) -> Cycle:
+    with as_file(files("qpmpc.cycles").joinpath(entry.data)) as path:
+        if entry.parts:
+            return read_breakpoints(path, entry.parts, name=entry.name)
+        return read_csv(path, name=entry.name)

@@ -1,0 +1,156 @@
+"""Is this the motion of a road vehicle, in the units it claims to be in?"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from qpmpc.cycles.cycle import Cycle, Floats
+from qpmpc.errors import InputError
+
+SPEED_MAX_MPS = 70.0
+"""252 km/h: no car of the kind modelled here gets near it."""
+
+ACCEL_MAX_MPS2 = 10.0
+"""About 1 g, over a whole second: beyond the grip of road tyres either way."""
+
+GRADE_MAX = 0.3
+"""The steepest public streets are just above it; a larger number is most likely in percent."""
+
+GAP_MAX_S = 10.0
+"""Longest hole that is filled by a straight line.
+
+A logger's dropout in a tunnel lasts some seconds; over a longer one a straight line would hide
+whole stops and their fuel. Where the speed is the same at both ends, as when the logger sleeps
+while the car stands, the straight line is what happened.
+"""
+
+GAP_SPEED_CHANGE_MPS = 0.5
+DURATION_MIN_S = 3.0
+DURATION_MAX_S = 86400.0
+
+POWER_P95_MAX_WPKG = 35.0
+"""Largest 95th percentile of ``v a`` over the accelerating seconds of a genuine drive.
+
+It is the statistic by which the EU's real driving emissions test (Regulation (EU) 2017/1151,
+Annex IIIA) refuses aggressive driving, above 14 to 30 W/kg depending on the mean speed. The shipped
+cycles have 8 to 13 W/kg and the aggressive US06 about 26. Calling km/h metres a second multiplies
+it by 3.6^2 = 13, calling mph so by 5: the shipped cycles then have at least 41.
+"""
+
+POWER_SECONDS_MIN = 60
+"""Accelerating seconds needed for that percentile; a short sprint may honestly exceed it."""
+
+ACCELERATING_MPS2 = 0.1
+
+MOVING_SPEED_MEAN_MAX_MPS = 50.0
+"""180 km/h on average while moving."""
+
+UNIT_HINT = "are they m/s? Divide km/h by 3.6, multiply mph by 0.44704"
+
+
+def check_samples(
+    path: Path, lines: Sequence[int], time_s: Floats, speed_mps: Floats, grade: Floats
+) -> None:
+    """Check the ranges of the samples and the order of time.
+
+    Parameters
+    ----------
+    path, lines
+        For the message: the file and the line of each sample.
+    time_s, speed_mps, grade
+        Finite samples of the file. Shape (m,), m >= 2.
+
+    Raises
+    ------
+    InputError
+        At the first sample that is out of range.
+    """
+    step_s = np.diff(time_s)
+    _refuse(path, lines[1:], step_s <= 0, time_s[1:], "time_s is {:g}, must increase strictly")
+    _refuse(path, lines, speed_mps < 0, speed_mps, "speed_mps is {:g}, must not be negative")
+    _refuse(
+        path,
+        lines,
+        speed_mps > SPEED_MAX_MPS,
+        speed_mps,
+        f"speed_mps is {{:g}}, must be 0 to {SPEED_MAX_MPS:g}; {UNIT_HINT}",
+    )
+    _refuse(
+        path,
+        lines,
+        np.abs(grade) > GRADE_MAX,
+        grade,
+        f"grade is {{:g}}, must be -{GRADE_MAX:g} to {GRADE_MAX:g}, rise over run: "
+        "divide percent by 100",
+    )
+    _refuse(
+        path,
+        lines[1:],
+        (step_s > GAP_MAX_S) & (np.abs(np.diff(speed_mps)) > GAP_SPEED_CHANGE_MPS),
+        step_s,
+        f"{{:g}} s without a sample, at most {GAP_MAX_S:g} s are allowed unless the speed is the "
+        "same before and after: what happened in between is not known",
+    )
+    duration_s = time_s[-1] - time_s[0]
+    if not DURATION_MIN_S <= duration_s <= DURATION_MAX_S:
+        raise InputError(
+            f"{path}: the trip lasts {duration_s:g} s, must be {DURATION_MIN_S:g} s to 24 h"
+        )
+
+
+def check_motion(path: Path, lines: Sequence[int], time_s: Floats, cycle: Cycle) -> None:
+    """Check that a road vehicle can move like this; catches most speeds in km/h or mph.
+
+    It cannot catch all: a calm town trip in mph is a plausible brisk trip in m/s.
+
+    Parameters
+    ----------
+    path, lines, time_s
+        For the message: the file, and line and time of each sample. Shape (m,).
+    cycle
+        The drive at 1 Hz: noise between its points does not count.
+
+    Raises
+    ------
+    InputError
+        If an acceleration, the specific power or the mean speed is out of reach.
+    """
+    speed, accel = cycle.step_speed_mps, cycle.step_accel_mps2
+    accelerating = accel > ACCELERATING_MPS2
+    if np.count_nonzero(accelerating) >= POWER_SECONDS_MIN:
+        power_wpkg = float(np.percentile((speed * accel)[accelerating], 95))
+        if power_wpkg > POWER_P95_MAX_WPKG:
+            raise InputError(
+                f"{path}: one accelerating second in twenty takes over {power_wpkg:.0f} W/kg, "
+                f"on the road that is at most {POWER_P95_MAX_WPKG:g}; the speeds look like km/h or "
+                f"mph: {UNIT_HINT}"
+            )
+    moving = speed > 0
+    mean_mps = float(np.mean(speed[moving])) if np.any(moving) else 0.0
+    if mean_mps > MOVING_SPEED_MEAN_MAX_MPS:
+        raise InputError(
+            f"{path}: the mean speed while moving is {mean_mps:.0f}, must be at most "
+            f"{MOVING_SPEED_MEAN_MAX_MPS:g} m/s; the speeds look like km/h or mph: {UNIT_HINT}"
+        )
+    if np.any(np.abs(accel) > ACCEL_MAX_MPS2):
+        k = int(np.argmax(np.abs(accel) > ACCEL_MAX_MPS2))
+        last = int(np.searchsorted(time_s - time_s[0], k, side="right"))
+        line = lines[min(last, len(lines) - 1)]
+        raise InputError(
+            f"{path}, line {line}: the speed changes by {accel[k]:.1f} m/s within a second, at most "
+            f"{ACCEL_MAX_MPS2:g} are allowed: a wrong sample, or {UNIT_HINT}"
+        )
+
+
+def _refuse(
+    path: Path,
+    lines: Sequence[int],
+    bad: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
+    values: Floats,
+    message: str,
+) -> None:
+    """Raise at the first bad sample; `message` has a place for its value."""
+    if np.any(bad):
+        k = int(np.argmax(bad))
+        raise InputError(f"{path}, line {lines[k]}: {message.format(values[k])}")
