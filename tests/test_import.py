@@ -1,0 +1,60 @@
+"""The name qpmpc belongs to an unrelated distribution on PyPI too: never run beside it."""
+
+import os
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+import qpmpc
+from qpmpc._clash import refuse_other_qpmpc
+
+
+def fake_distribution(site: Path, name: str) -> None:
+    info = site / f"{name.replace('-', '_')}-3.1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 3.1.0\n")
+
+
+def test_version_is_that_of_the_distribution() -> None:
+    assert version("qpmpc-iptm") == qpmpc.__version__
+
+
+def test_other_distribution_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fake_distribution(tmp_path, "qpmpc")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(ImportError, match=r"qpmpc 3\.1\.0 .*pip uninstall qpmpc ") as caught:
+        refuse_other_qpmpc()
+    assert "\n" not in str(caught.value)
+
+
+def test_similar_names_are_not_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fake_distribution(tmp_path, "qpmpc-iptm")
+    fake_distribution(tmp_path, "qpmpcx")
+    monkeypatch.syspath_prepend(tmp_path)
+    refuse_other_qpmpc()
+
+
+def test_import_beside_the_other_distribution_fails(tmp_path: Path) -> None:
+    fake_distribution(tmp_path, "qpmpc")
+    run = subprocess.run(
+        [sys.executable, "-c", "import qpmpc.errors"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+    )
+    assert run.returncode == 1
+    assert "pip uninstall qpmpc" in run.stderr.strip().splitlines()[-1]
+
+
+def test_import_is_light() -> None:
+    """`import qpmpc` alone loads no numerical library; the command line relies on it."""
+    code = (
+        "import sys, qpmpc; "
+        "print(*{'numpy', 'scipy', 'osqp', 'cvxpy', 'pydantic', 'casadi'} & set(sys.modules))"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.split() == []
