@@ -63,7 +63,7 @@ class Cycle:
             object.__setattr__(self, field, array)
         points = len(self.time_s)
         if points < 2 or not np.array_equal(self.time_s, np.arange(points)):
-            raise InputError(f"cycle {self.name}: time_s must be 0, 1, 2, .. with at least 2 points")
+            raise InputError(f"cycle {self.name}: time_s must be 0, 1, 2, .., at least 2 points")
         if not len(self.speed_mps) == len(self.grade) == points:
             raise InputError(f"cycle {self.name}: time_s, speed_mps and grade differ in length")
         if np.any(self.speed_mps < 0):
@@ -104,7 +104,7 @@ class Cycle:
             raise InputError(f"cycle {name}: time_s, speed_mps and grade differ in shape")
         # "not all greater" also refuses NaN
         if len(time) < 2 or not np.all(np.diff(time) > 0):
-            raise InputError(f"cycle {name}: time_s must increase strictly, over at least 2 samples")
+            raise InputError(f"cycle {name}: time_s must increase, over at least 2 samples")
         elapsed = time - time[0]
         grid = np.arange(np.floor(elapsed[-1] + TIME_ROUNDING_S) + 1.0)
         return cls(

@@ -1,4 +1,4 @@
-"""Is this the motion of a road vehicle, in the units it claims to be in?"""
+"""Whether this is the motion of a road vehicle, in the units it claims to be in."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -138,7 +138,7 @@ def check_motion(path: Path, lines: Sequence[int], time_s: Floats, cycle: Cycle)
         last = int(np.searchsorted(time_s - time_s[0], k, side="right"))
         line = lines[min(last, len(lines) - 1)]
         raise InputError(
-            f"{path}, line {line}: the speed changes by {accel[k]:.1f} m/s within a second, at most "
+            f"{path}, line {line}: the speed changes by {accel[k]:.1f} m/s in a second, at most "
             f"{ACCEL_MAX_MPS2:g} are allowed: a wrong sample, or {UNIT_HINT}"
         )
 

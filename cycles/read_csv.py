@@ -14,13 +14,13 @@ REQUIRED = ("time_s", "speed_mps")
 OPTIONAL = ("grade",)
 ALLOWED_TEXT = "time_s,speed_mps[,grade]"
 
-# Column names that are right but for the unit, and how to convert them.
+# Columns in a wrong unit: what gives them away, how to convert them, and to which column.
 CONVERSIONS = (
-    (re.compile(r"km/?h|kph|kmph", re.I), "divide km/h by 3.6 and name the column speed_mps"),
-    (re.compile(r"mph|mi/h", re.I), "multiply mph by 0.44704 and name the column speed_mps"),
-    (re.compile(r"knot|kts?$", re.I), "multiply knots by 0.514444 and name the column speed_mps"),
-    (re.compile(r"grade.*(%|percent|pct)", re.I), "divide percent by 100 and name the column grade"),
-    (re.compile(r"time.*(_ms|\[ms|\(ms|milli)", re.I), "divide ms by 1000 and name the column time_s"),
+    (re.compile(r"km/?h|kph|kmph", re.I), "divide km/h by 3.6", "speed_mps"),
+    (re.compile(r"mph|mi/h", re.I), "multiply mph by 0.44704", "speed_mps"),
+    (re.compile(r"knot|kts?$", re.I), "multiply knots by 0.514444", "speed_mps"),
+    (re.compile(r"grade.*(%|percent|pct)", re.I), "divide percent by 100", "grade"),
+    (re.compile(r"time.*(_ms|\[ms|\(ms|milli)", re.I), "divide ms by 1000", "time_s"),
 )
 
 
@@ -95,10 +95,10 @@ def _columns(path: Path, header: list[str]) -> list[str]:
         found = found[:77] + "..."
     message = f"{path}, line 1: columns found: {found!r}; allowed: {ALLOWED_TEXT}"
     hints = [
-        f"{column!r}: {advice}"
+        f"{column!r}: {conversion} and name the column {target}"
         for column in header
         if column not in REQUIRED + OPTIONAL
-        for pattern, advice in CONVERSIONS
+        for pattern, conversion, target in CONVERSIONS
         if pattern.search(column)
     ]
     if len(header) == 1 and re.search(r"[;\t]", found):
