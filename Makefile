@@ -27,9 +27,8 @@ lint: $(STAMP)
 
 types: $(STAMP)
 	@rm -rf $(TYPED) && mkdir -p $(TYPED)/qpmpc
-	@ln -s $(CURDIR)/qpmpc/* $(addprefix $(CURDIR)/,codegen cycles verification) $(TYPED)/qpmpc/
-	cd $(TYPED) && $(CURDIR)/$(BIN)/mypy --config-file $(CURDIR)/pyproject.toml \
-		--cache-dir $(CURDIR)/.mypy_cache -p qpmpc
+	@cd $(TYPED)/qpmpc && ln -s ../../../qpmpc/* ../../../codegen ../../../cycles ../../../verification .
+	cd $(TYPED) && ../../$(BIN)/mypy --config-file ../../pyproject.toml --cache-dir ../../.mypy_cache -p qpmpc
 
 venv: $(STAMP)
 
