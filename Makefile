@@ -41,7 +41,7 @@ $(STAMP): requirements.lock pyproject.toml setup.py
 			&& $(PYTHON) -m pip --python $(BIN)/python install --quiet pip; } \
 		|| { echo "$(PYTHON) can make no virtual environment: install python3-venv or pip" >&2; exit 1; }
 	@$(PIP) install --quiet -r requirements.lock
-	@$(PIP) install --quiet --no-deps --no-build-isolation --editable .
+	@PYTHONWARNINGS=ignore $(PIP) install --quiet --no-deps --no-build-isolation --editable .
 	@touch $@
 
 clean:

@@ -1,15 +1,26 @@
 """Map the top-level folders codegen, cycles and verification into the package qpmpc.
 
 Everything else about the build is in pyproject.toml. The packages are found here because
-setuptools cannot find packages below a renamed folder from a static table.
+setuptools cannot find packages below a renamed folder from a static table. Folders of data count
+as packages too, as setuptools wants it.
 """
 
-from setuptools import find_packages, setup
+from setuptools import find_namespace_packages, setup
 
-mapped = ("codegen", "cycles", "verification")
+folders = {
+    "qpmpc": "qpmpc",
+    "qpmpc.codegen": "codegen",
+    "qpmpc.cycles": "cycles",
+    "qpmpc.verification": "verification",
+}
 
-packages = find_packages(include=["qpmpc", "qpmpc.*"])
-for folder in mapped:
-    packages += [f"qpmpc.{name}" for name in find_packages(include=[folder, f"{folder}.*"])]
+packages = [
+    name
+    for package, folder in folders.items()
+    for name in (
+        package,
+        *(f"{package}.{sub}" for sub in find_namespace_packages(folder, exclude=["*__pycache__"])),
+    )
+]
 
-setup(packages=packages, package_dir={f"qpmpc.{folder}": folder for folder in mapped})
+setup(packages=packages, package_dir=folders)

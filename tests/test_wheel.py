@@ -78,7 +78,7 @@ def import_path(file: PurePosixPath) -> PurePosixPath:
 
 
 def test_every_file_is_in_the_wheel(source: Path, wheel: Path) -> None:
-    """A folder without __init__.py, or a new kind of data file, would be left out silently."""
+    """A new kind of data file would be left out silently."""
     with zipfile.ZipFile(wheel) as archive:
         packed = {PurePosixPath(name) for name in archive.namelist()}
     expected = {
@@ -89,7 +89,7 @@ def test_every_file_is_in_the_wheel(source: Path, wheel: Path) -> None:
     }
     assert PurePosixPath("qpmpc/cycles/data/nycc.csv") in expected
     missing = sorted(str(path) for path in expected - packed)
-    assert not missing, f"a folder lacks __init__.py, or package-data a pattern: {missing}"
+    assert not missing, f"package-data in pyproject.toml lacks a pattern for {missing}"
 
 
 def test_the_wheel_claims_one_name(wheel: Path) -> None:
