@@ -1,0 +1,13 @@
+"""The exceptions of qpmpc: one base class, so that callers need to catch one thing."""
+
+
+class QpmpcError(Exception):
+    """Base class of every error raised on purpose by qpmpc."""
+
+
+class InputError(QpmpcError):
+    """A file, value or option given by the user cannot be used.
+
+    The message is one line: it names the offender and says what is allowed.
+    The command line prints it and exits with code 2.
+    """

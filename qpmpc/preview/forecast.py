@@ -1,0 +1,45 @@
+"""What is known of the road ahead: a forecast of the trip, apart from the true cycle."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpmpc.cycles import Cycle
+from qpmpc.vehicle.demand import demand_w
+from qpmpc.vehicle.parameters import Vehicle
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Demand and speed of each 1 s step of a trip, true or forecast.
+
+    Attributes
+    ----------
+    demand_w : P_d, negative when braking, shape (steps,)
+    speed_mps : mean speed of each step, shape (steps,)
+    """
+
+    demand_w: NDArray[np.float64]
+    speed_mps: NDArray[np.float64]
+
+    @property
+    def steps(self) -> int:
+        """Number of 1 s steps."""
+        return len(self.demand_w)
+
+    @classmethod
+    def of(cls, cycle: Cycle, vehicle: Vehicle) -> "Trace":
+        """Compute the demand and speed trace of a cycle."""
+        return cls(demand_w(cycle, vehicle.chassis), cycle.step_speed_mps)
+
+    def battery_side_w(self, vehicle: Vehicle) -> NDArray[np.float64]:
+        """Net power asked of engine and battery, P0 = P_d + P_aux, W, shape (steps,).
+
+        Braking beyond the battery's charge limit goes to the friction brakes, and no more is
+        asked than engine and battery can give together.
+        """
+        battery = vehicle.battery
+        most = battery.power_discharge_max_w + vehicle.engine.power_max_w
+        net = self.demand_w + battery.aux_power_w
+        return np.clip(net, -battery.power_charge_max_w, most)

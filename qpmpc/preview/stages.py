@@ -1,0 +1,112 @@
+"""From preview to stages: the data that a QP needs of the road ahead, in fixed slots."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpmpc.preview.forecast import Trace
+from qpmpc.preview.horizon import HorizonSettings
+from qpmpc.vehicle.parameters import Vehicle
+
+
+@dataclass(frozen=True)
+class Stages:
+    """One horizon, stage by stage; shape (n,) each.
+
+    A stage of duration 0 is masked: it passes the state on and costs nothing.
+
+    Attributes
+    ----------
+    duration_s : h_k
+    net_w : P0 = P_d + P_aux, mean over the stage
+    speed_mps : mean speed
+    """
+
+    duration_s: NDArray[np.float64]
+    net_w: NDArray[np.float64]
+    speed_mps: NDArray[np.float64]
+
+
+class StageBuilder:
+    """Cuts a trip into stages at any time step.
+
+    Slots are fixed from departure to arrival: the first N are the next N seconds, then each block
+    of the trip has one slot a demand class, at its own absolute place. A block that has passed,
+    or that the short horizon covers, has duration 0. So a long stage keeps its slot, which is
+    what lets primal and dual variables be carried from step to step by identity.
+
+    Parameters
+    ----------
+    vehicle : parameters
+    truth : what the short horizon sees
+    forecast : what the long horizon sees; its length sets the blocks
+    settings : layout
+    """
+
+    def __init__(
+        self, vehicle: Vehicle, truth: Trace, forecast: Trace, settings: HorizonSettings
+    ) -> None:
+        self.settings = settings
+        self.steps = truth.steps
+        self._short_net_w = truth.battery_side_w(vehicle)
+        self._short_speed_mps = truth.speed_mps
+        demand_class = _demand_class(forecast.demand_w, settings)
+        self._cumulative = _cumulative(forecast, vehicle, demand_class, settings.classes)
+        block_s = settings.block_length_s(forecast.steps)
+        self.count = settings.stage_count(forecast.steps)
+        self._block_start = np.arange(settings.block_count(forecast.steps)) * block_s
+        self._block_end = np.minimum(self._block_start + block_s, forecast.steps)
+
+    def at(self, step: int) -> Stages:
+        """Return the stages of the horizon that starts at time step `step`."""
+        n_short = self.settings.short_stages
+        seen = min(n_short, self.steps - step)
+        fields = np.zeros((3, self.count))
+        fields[0, :seen] = 1.0
+        fields[1, :seen] = self._short_net_w[step : step + seen]
+        fields[2, :seen] = self._short_speed_mps[step : step + seen]
+        start = np.clip(step + seen, self._block_start, self._block_end)
+        # (classes, 3, blocks) -> fields of the long stages, block by block, class by class
+        sums = self._cumulative[:, :, self._block_end] - self._cumulative[:, :, start]
+        duration = sums[:, 0].T.ravel()
+        fields[0, n_short:] = duration
+        fields[1:, n_short:] = sums[:, 1:].transpose(1, 2, 0).reshape(2, -1)
+        fields[1:, n_short:] /= np.maximum(duration, 1.0)
+        return Stages(*fields)
+
+    def shift(self) -> NDArray[np.intp]:
+        """Where each slot's warm start comes from in the solution of the step before.
+
+        Short stages move up by one and the last keeps its own values, which measured better than
+        those of the long stage it leaves; long stages stay.
+        """
+        source = np.arange(self.count)
+        source[: self.settings.short_stages - 1] += 1
+        return source
+
+
+def _demand_class(demand_w: NDArray[np.float64], settings: HorizonSettings) -> NDArray[np.intp]:
+    """Class of each step: 0 hard, 1 easy, 2 braking; all 0 with one class."""
+    if settings.classes == 1:
+        return np.zeros(len(demand_w), dtype=np.intp)
+    easy_or_braking = np.where(demand_w < settings.class_braking_w, 2, 1)
+    return np.where(demand_w > settings.class_hard_w, 0, easy_or_braking).astype(np.intp)
+
+
+def _cumulative(
+    forecast: Trace, vehicle: Vehicle, demand_class: NDArray[np.intp], classes: int
+) -> NDArray[np.float64]:
+    """Running sums over time of duration, P0 and speed, apart for each class.
+
+    Returns
+    -------
+    shape (classes, 3, steps + 1)
+    """
+    fields = np.stack(
+        [np.ones(forecast.steps), forecast.battery_side_w(vehicle), forecast.speed_mps]
+    )
+    member = demand_class == np.arange(classes)[:, None]
+    sums = np.zeros((classes, 3, forecast.steps + 1))
+    np.cumsum(fields[None] * member[:, None], axis=2, out=sums[:, :, 1:])
+    return sums

@@ -1,0 +1,105 @@
+"""Reading and checking parameters: TOML text, dotted overrides, one-line errors."""
+
+import tomllib
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from qpmpc.errors import InputError
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def load_toml(text: str, owner: str) -> dict[str, Any]:
+    """Parse TOML text; `owner` names it in the error.
+
+    Raises
+    ------
+    InputError
+        If the text is not valid TOML.
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{owner}: not valid TOML: {error}") from error
+
+
+def validated(model: type[Model], data: dict[str, Any], owner: str) -> Model:
+    """Build `model` from `data`; `owner` names the data in the error.
+
+    Raises
+    ------
+    InputError
+        One line naming the first wrong key, its value and what is allowed.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        problem = first["msg"].removeprefix("Value error, ")
+        given = first["input"]
+        shown = f" (given: {given!r})" if isinstance(given, int | float | str) else ""
+        raise InputError(f"{owner}: {key + ': ' if key else ''}{problem}{shown}") from error
+
+
+def parse_setting(text: str) -> tuple[str, object]:
+    """Split ``key=value``; the value is read as TOML, else kept as a string.
+
+    Raises
+    ------
+    InputError
+        If there is no ``=`` or no key.
+    """
+    key, separator, value = text.partition("=")
+    key, value = key.strip(), value.strip()
+    if not separator or not key or not value:
+        raise InputError(f"--set {text!r}: expected KEY=VALUE, e.g. thermal.t_amb_degc=-15")
+    try:
+        return key, tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key, value
+
+
+def parse_settings(texts: list[str]) -> dict[str, object]:
+    """Parse several ``key=value`` texts; a later one wins over an earlier one.
+
+    Raises
+    ------
+    InputError
+        See `parse_setting`.
+    """
+    return dict(parse_setting(text) for text in texts)
+
+
+def apply_settings(data: dict[str, Any], settings: dict[str, object], owner: str) -> dict[str, Any]:
+    """Return a copy of nested `data` with the dotted keys of `settings` replaced.
+
+    Raises
+    ------
+    InputError
+        If a dotted key does not exist in `data`; the allowed keys at that place are listed.
+    """
+    result = _copy(data)
+    for dotted, value in settings.items():
+        *parents, last = dotted.split(".")
+        place = result
+        for part in parents:
+            inner = place.get(part)
+            if not isinstance(inner, dict):
+                raise _unknown(dotted, part, place, owner)
+            place = inner
+        if last not in place or isinstance(place[last], dict):
+            raise _unknown(dotted, last, place, owner)
+        place[last] = value
+    return result
+
+
+def _copy(data: dict[str, Any]) -> dict[str, Any]:
+    return {k: _copy(v) if isinstance(v, dict) else v for k, v in data.items()}
+
+
+def _unknown(dotted: str, part: str, place: dict[str, Any], owner: str) -> InputError:
+    return InputError(
+        f"{owner}: no parameter {dotted!r}: {part!r} is not one of {', '.join(sorted(place))}"
+    )

@@ -1,0 +1,17 @@
+"""Vehicle: parameters, nonlinear maps, power demand and the plant."""
+
+from qpmpc.vehicle.demand import demand_w
+from qpmpc.vehicle.parameters import DEFAULT_VEHICLE, Vehicle, load_vehicle, vehicle_names
+from qpmpc.vehicle.plant import Command, Plant, PlantState, StepFlows
+
+__all__ = [
+    "DEFAULT_VEHICLE",
+    "Command",
+    "Plant",
+    "PlantState",
+    "StepFlows",
+    "Vehicle",
+    "demand_w",
+    "load_vehicle",
+    "vehicle_names",
+]

@@ -1,0 +1,56 @@
+"""Battery as open-circuit voltage behind a resistance, paper eq. (1)."""
+
+from math import sqrt
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from qpmpc.vehicle.parameters import Battery
+from qpmpc.vehicle.table import Table
+
+
+class BatteryMaps:
+    """Maps of one battery: U_oc(SOC), R(SOC, direction), current and internal power.
+
+    Attributes
+    ----------
+    charge_c : capacity in ampere seconds
+    """
+
+    def __init__(self, battery: Battery) -> None:
+        self.open_circuit = Table(battery.soc_grid, battery.open_circuit_v)
+        self.discharge = Table(battery.soc_grid, battery.resistance_discharge_ohm)
+        self.charge = Table(battery.soc_grid, battery.resistance_charge_ohm)
+        self.charge_c = 3600.0 * battery.capacity_ah
+
+    def energy_j(self, soc: float) -> float:
+        """Energy of a unit of SOC about `soc`: U_oc(soc) times the capacity, in J."""
+        return self.open_circuit.at(soc) * self.charge_c
+
+    def current_a(self, soc: float, power_w: float) -> float:
+        """Current at terminal power, I = [U - sqrt(U^2 - 4 R P)] / (2 R), discharge positive.
+
+        Beyond the most the battery can give, U^2/(4 R), the current stays at U/(2 R).
+        """
+        voltage = self.open_circuit.at(soc)
+        table = self.discharge if power_w >= 0.0 else self.charge
+        resistance = table.at(soc)
+        root = voltage * voltage - 4.0 * resistance * power_w
+        return (voltage - sqrt(max(root, 0.0))) / (2.0 * resistance)
+
+    def internal_power_w(self, soc: ArrayLike, power_w: ArrayLike) -> NDArray[np.float64]:
+        """Power drawn from the store, G = U_oc I = P + R I^2, for arrays.
+
+        Parameters
+        ----------
+        soc, power_w : broadcastable arrays; power_w at the terminals, discharge positive
+
+        Returns
+        -------
+        internal power in W; convex in power_w with slope 1 at zero
+        """
+        power = np.asarray(power_w, dtype=float)
+        voltage = self.open_circuit(soc)
+        resistance = np.where(power >= 0.0, self.discharge(soc), self.charge(soc))
+        root = np.sqrt(np.maximum(voltage**2 - 4.0 * resistance * power, 0.0))
+        return np.asarray(voltage * (voltage - root) / (2.0 * resistance))

@@ -1,0 +1,78 @@
+"""Engine: fuel map, optimal operating line, cold multiplier."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from qpmpc.errors import InputError
+from qpmpc.vehicle.parameters import ColdEngine, Engine
+from qpmpc.vehicle.table import Table
+
+LINE_STEP_W = 50.0
+MAP_STEP_RPM = 5.0
+
+
+def fuel_power_w(engine: Engine, speed_rpm: ArrayLike, power_w: ArrayLike) -> NDArray[np.float64]:
+    """Fuel power of the hot engine at any speed and power.
+
+    P_fuel = 1e3 K(N) V_L N / 60 + P_eng / eta_ind, the fuel map of paper eq. (5).
+
+    Parameters
+    ----------
+    speed_rpm, power_w : broadcastable arrays
+
+    Returns
+    -------
+    fuel power in W, same shape; the torque limit is not checked here
+    """
+    friction = np.interp(speed_rpm, engine.friction_speed_rpm, engine.friction_kj_per_rev_l)
+    pumping_w = 1e3 * friction * engine.displacement_l * np.asarray(speed_rpm) / 60.0
+    return pumping_w + np.asarray(power_w) / engine.indicated_efficiency
+
+
+class OptimalLine:
+    """Optimal operating line: at each power the speed of least fuel within the torque limit.
+
+    Attributes
+    ----------
+    power_w, speed_rpm, torque_nm, fuel_g_per_s : arrays along the line, shape (m,)
+    fuel : `Table` power_w -> fuel_g_per_s of the hot engine, engine on
+    power_max_w : rated power
+    """
+
+    def __init__(self, engine: Engine) -> None:
+        low = max(engine.friction_speed_rpm[0], engine.torque_speed_rpm[0])
+        high = min(engine.friction_speed_rpm[-1], engine.torque_speed_rpm[-1])
+        speed = np.arange(low, high + MAP_STEP_RPM, MAP_STEP_RPM).clip(max=high)
+        omega = speed * (2.0 * np.pi / 60.0)
+        limit_w = np.interp(speed, engine.torque_speed_rpm, engine.torque_max_nm) * omega
+        if limit_w.max() < engine.power_max_w * (1.0 - 1e-3):
+            raise InputError(
+                f"engine.power_max_w: {engine.power_max_w:.0f} W is above the "
+                f"{limit_w.max():.0f} W that torque_max_nm allows"
+            )
+        count = int(np.ceil(engine.power_max_w / LINE_STEP_W)) + 1
+        self.power_w = np.linspace(0.0, engine.power_max_w, count)
+        fuel_w = fuel_power_w(engine, speed[None, :], self.power_w[:, None])
+        reachable = limit_w[None, :] >= np.minimum(self.power_w, limit_w.max())[:, None]
+        best = np.where(reachable, fuel_w, np.inf).argmin(axis=1)
+        self.speed_rpm = speed[best]
+        self.torque_nm = self.power_w / omega[best]
+        self.fuel_g_per_s = fuel_w[np.arange(count), best] / engine.lhv_j_per_kg * 1e3
+        self.fuel = Table(self.power_w, self.fuel_g_per_s)
+        self.power_max_w = engine.power_max_w
+
+
+def alpha(cold: ColdEngine, t_cl_degc: ArrayLike) -> NDArray[np.float64]:
+    """Cold multiplier of fuel, alpha(T) = 1 + k ((T_hot - T)/span)^e below T_hot, else 1.
+
+    Source: paper eq. (5) and its Fig. 2 for the shape. Array in, array out, dimensionless.
+    """
+    below = np.maximum(cold.hot_degc - np.asarray(t_cl_degc, dtype=float), 0.0)
+    return 1.0 + cold.k * (below / cold.span_k) ** cold.exponent
+
+
+def alpha_at(cold: ColdEngine, t_cl_degc: float) -> float:
+    """`alpha` at one temperature (the plant's fast path)."""
+    if t_cl_degc >= cold.hot_degc:
+        return 1.0
+    return 1.0 + cold.k * float(((cold.hot_degc - t_cl_degc) / cold.span_k) ** cold.exponent)

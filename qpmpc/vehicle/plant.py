@@ -1,0 +1,158 @@
+"""The plant: one explicit step of SOC and coolant temperature, paper eqs. (1)-(5).
+
+This is the truth that every controller is measured on. Controllers never call it.
+"""
+
+from typing import NamedTuple
+
+from qpmpc.vehicle.battery import BatteryMaps
+from qpmpc.vehicle.engine import OptimalLine, alpha_at
+from qpmpc.vehicle.parameters import Vehicle
+
+
+class PlantState(NamedTuple):
+    """State at the start of a step."""
+
+    soc: float
+    t_cl_degc: float
+    engine_on: bool = False
+
+
+class Command(NamedTuple):
+    """What a controller asks of the engine for one step."""
+
+    engine_on: bool
+    p_eng_w: float
+
+
+class StepFlows(NamedTuple):
+    """Every flow of one step, in W unless the name says otherwise; the books must balance.
+
+    `p_bat_w` is what the battery gives at its terminals (discharge positive), `internal_w` what
+    leaves its store, `p_friction_w` what the friction brakes take (electrical side, positive).
+    `power_excess_w` is how far the command exceeds engine or battery power limits.
+    """
+
+    fuel_g: float
+    fuel_w: float
+    p_eng_w: float
+    p_bat_w: float
+    internal_w: float
+    p_friction_w: float
+    exhaust_w: float
+    air_w: float
+    radiator_w: float
+    cabin_w: float
+    coolant_w: float
+    started: bool
+    power_excess_w: float
+
+
+class Plant:
+    """Nonlinear plant of one vehicle, advanced by `step`.
+
+    Parameters
+    ----------
+    vehicle : parameters
+    step_s : explicit step, s
+    """
+
+    def __init__(self, vehicle: Vehicle, step_s: float = 1.0) -> None:
+        self.vehicle = vehicle
+        self.step_s = step_s
+        self.line = OptimalLine(vehicle.engine)
+        self.battery = BatteryMaps(vehicle.battery)
+
+    def initial_state(self) -> PlantState:
+        """Return the state at the start of a trip: engine off, SOC and coolant from `trip`."""
+        return PlantState(self.vehicle.trip.soc_init, self.vehicle.trip.t_cl_init_degc)
+
+    def air_w(self, t_cl_degc: float, speed_mps: float) -> float:
+        """Heat lost to the air, Q_air = (UA0 + UA1 v) (T_cl - T_amb)."""
+        th = self.vehicle.thermal
+        conductance = th.ua0_w_per_k + th.ua1_w_per_k_per_mps * speed_mps
+        return conductance * (t_cl_degc - th.t_amb_degc)
+
+    def radiator_w(self, t_cl_degc: float) -> float:
+        """Heat lost through the radiator, which the thermostat opens linearly over its span."""
+        th = self.vehicle.thermal
+        opening = min(max((t_cl_degc - th.thermostat_open_degc) / th.thermostat_span_k, 0.0), 1.0)
+        return opening * th.radiator_w_per_k * (t_cl_degc - th.t_amb_degc)
+
+    def cabin_w(self, t_cl_degc: float) -> float:
+        """Heat taken by the cabin, Q_heat, faded in between two coolant temperatures."""
+        th = self.vehicle.thermal
+        span = th.cabin_heat_full_degc - th.cabin_heat_from_degc
+        return th.cabin_heat_w * min(max((t_cl_degc - th.cabin_heat_from_degc) / span, 0.0), 1.0)
+
+    def step(
+        self, state: PlantState, command: Command, demand_w: float, speed_mps: float
+    ) -> tuple[PlantState, StepFlows]:
+        """Advance one step.
+
+        dSOC/dt = -I / C_bat (eq. 1), P_bat = P_d + P_aux - P_eng (eq. 2),
+        M C dT/dt = Q_fuel - P_eng - Q_exh - Q_air - Q_rad - Q_heat (eq. 3),
+        Q_fuel = LHV alpha(T) f_fuel(P_eng) (eqs. 4, 5), Q_exh = x (Q_fuel - P_eng).
+
+        Braking power that the battery cannot take goes to the friction brakes. A command beyond
+        the engine's limits is clipped to them; what clipping and the battery leave uncovered is
+        reported as `power_excess_w`.
+
+        Parameters
+        ----------
+        state : SOC, coolant temperature, whether the engine ran in the last step
+        command : engine on or off and its power; power with the engine off counts as excess
+        demand_w : P_d, negative when braking
+        speed_mps : mean speed of the step
+        """
+        vehicle = self.vehicle
+        engine, battery, h = vehicle.engine, vehicle.battery, self.step_s
+        on = command.engine_on
+        low, high = (engine.power_min_w, engine.power_max_w) if on else (0.0, 0.0)
+        p_eng = min(max(command.p_eng_w, low), high)
+        p_bat = demand_w + battery.aux_power_w - p_eng
+        friction = 0.0
+        if p_bat < -battery.power_charge_max_w:
+            friction = min(-battery.power_charge_max_w - p_bat, max(-demand_w, 0.0))
+            p_bat += friction
+        excess = max(
+            abs(p_eng - command.p_eng_w),
+            p_bat - battery.power_discharge_max_w,
+            -battery.power_charge_max_w - p_bat,
+        )
+        started = on and not state.engine_on
+        fuel_g = 0.0
+        if on:
+            fuel_g = h * alpha_at(vehicle.cold_engine, state.t_cl_degc) * self.line.fuel.at(p_eng)
+            fuel_g += engine.start_fuel_g * started
+        fuel_w = fuel_g / h * engine.lhv_j_per_kg * 1e-3
+        exhaust = vehicle.thermal.exhaust_share * (fuel_w - p_eng)
+        air = self.air_w(state.t_cl_degc, speed_mps)
+        radiator = self.radiator_w(state.t_cl_degc)
+        cabin = self.cabin_w(state.t_cl_degc)
+        coolant = fuel_w - p_eng - exhaust - air - radiator - cabin
+        current = self.battery.current_a(state.soc, p_bat)
+        following = PlantState(
+            state.soc - h * current / self.battery.charge_c,
+            state.t_cl_degc + h * coolant / vehicle.thermal.heat_capacity_j_per_k,
+            on,
+        )
+        flows = StepFlows(
+            fuel_g=fuel_g,
+            fuel_w=fuel_w,
+            p_eng_w=p_eng,
+            p_bat_w=p_bat,
+            internal_w=current * self.battery.open_circuit.at(state.soc),
+            p_friction_w=friction,
+            exhaust_w=exhaust,
+            air_w=air,
+            radiator_w=radiator,
+            cabin_w=cabin,
+            coolant_w=coolant,
+            started=started,
+            power_excess_w=excess if excess > POWER_TOLERANCE_W else 0.0,
+        )
+        return following, flows
+
+
+POWER_TOLERANCE_W = 1e-6
