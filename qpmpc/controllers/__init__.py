@@ -1,0 +1,1 @@
+"""Controllers: what drives the engine, from rules to the multi-horizon QP."""

@@ -1,0 +1,122 @@
+"""Controllers by name, with their settings and dotted overrides."""
+
+from collections.abc import Callable
+
+from pydantic import BaseModel, ConfigDict
+
+from qpmpc.controllers.base import Controller
+from qpmpc.controllers.mh_qp import MhQp, MhQpSettings
+from qpmpc.controllers.rule_based import RuleBased, RuleBasedSettings
+from qpmpc.errors import InputError
+from qpmpc.preview.forecast import Trace
+from qpmpc.preview.horizon import HorizonSettings
+from qpmpc.qp.stage_qp import QpSettings
+from qpmpc.settings import apply_settings, validated
+from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.vehicle.plant import Plant
+
+PAPER = MhQpSettings(
+    horizon=HorizonSettings(short_stages=20, blocks=0, block_s=20, classes=1),
+    qp=QpSettings(terminal_low=0.99, terminal_high=1.01),
+)
+
+
+class ControllerSettings(BaseModel):
+    """Settings of every controller; the first part of a dotted name picks the controller."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    rule_based: RuleBasedSettings = RuleBasedSettings()
+    mh_qp: MhQpSettings = MhQpSettings()
+    mh_qp_paper: MhQpSettings = PAPER
+
+    def with_settings(self, settings: dict[str, object]) -> "ControllerSettings":
+        """Return a copy with dotted keys replaced, e.g. ``{"mh_qp.osqp.iterations": 25}``.
+
+        Raises
+        ------
+        InputError
+            If a key does not exist or a value is not allowed.
+        """
+        data = apply_settings(self.model_dump(), settings, owner="controller settings")
+        return validated(ControllerSettings, data, "controller settings")
+
+
+def split_settings(
+    settings: dict[str, object],
+) -> tuple[dict[str, object], dict[str, object]]:
+    """Split dotted settings into those of the vehicle and those of the controllers.
+
+    Raises
+    ------
+    InputError
+        If the first part of a name is neither.
+    """
+    vehicle: dict[str, object] = {}
+    controllers: dict[str, object] = {}
+    for key, value in settings.items():
+        section = key.split(".")[0]
+        if section in ControllerSettings.model_fields:
+            controllers[key] = value
+        elif section in Vehicle.model_fields and "." in key:
+            vehicle[key] = value
+        else:
+            allowed = sorted({*ControllerSettings.model_fields, *Vehicle.model_fields} - SCALARS)
+            raise InputError(
+                f"no parameter {key!r}: names start with one of {', '.join(allowed)} and a dot"
+            )
+    return vehicle, controllers
+
+
+SCALARS = {"name", "description"}
+
+
+def _rule_based(plant: Plant, truth: Trace, forecast: Trace, s: ControllerSettings) -> Controller:
+    return RuleBased(plant, s.rule_based)
+
+
+def _mh_qp(plant: Plant, truth: Trace, forecast: Trace, s: ControllerSettings) -> Controller:
+    return MhQp("mh-qp", plant, truth, forecast, s.mh_qp, s.rule_based)
+
+
+def _mh_qp_paper(plant: Plant, truth: Trace, forecast: Trace, s: ControllerSettings) -> Controller:
+    return MhQp("mh-qp-paper", plant, truth, forecast, s.mh_qp_paper, s.rule_based)
+
+
+_MAKERS: dict[str, Callable[[Plant, Trace, Trace, ControllerSettings], Controller]] = {
+    "mh-qp": _mh_qp,
+    "mh-qp-paper": _mh_qp_paper,
+    "rule-based": _rule_based,
+}
+
+
+def controller_names() -> tuple[str, ...]:
+    """Return the names of the causal controllers, the default first."""
+    return tuple(_MAKERS)
+
+
+def make_controller(
+    name: str,
+    plant: Plant,
+    truth: Trace,
+    forecast: Trace | None = None,
+    settings: ControllerSettings | None = None,
+) -> Controller:
+    """Make a controller for one trip.
+
+    Parameters
+    ----------
+    name : one of `controller_names`
+    plant : vehicle and its maps
+    truth : what the short horizon sees
+    forecast : what the long horizon sees; the truth if None
+    settings : of all controllers
+
+    Raises
+    ------
+    InputError
+        If the name is unknown.
+    """
+    if name not in _MAKERS:
+        raise InputError(f"unknown controller {name!r}: use one of {', '.join(_MAKERS)}")
+    return _MAKERS[name](plant, truth, forecast or truth, settings or ControllerSettings())

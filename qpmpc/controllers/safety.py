@@ -1,0 +1,86 @@
+"""Safety layer: makes any one-step command admissible, in closed form."""
+
+from qpmpc.controllers.base import Observation
+from qpmpc.vehicle.engine import alpha_at
+from qpmpc.vehicle.plant import Command, Plant
+
+SOC_MARGIN = 0.002  # a step of full power moves SOC by less than this
+T_CL_MARGIN_K = 0.15  # a step of engine off cools the coolant by less than this
+T_CL_SOFT_K = 0.5  # engine power is cut back over this distance below the upper limit
+
+
+class SafetyLayer:
+    """Corrects a command so that the next second keeps power, SOC and coolant limits.
+
+    Whatever the optimiser returned, the result is finite and in range. In order of rank, the
+    last word first: battery and engine power limits; SOC limits; coolant limits.
+
+    Parameters
+    ----------
+    plant : gives limits and one-step heat flows; its state is never touched
+    heat_power_w : engine power when it runs for heat alone
+    """
+
+    def __init__(self, plant: Plant, heat_power_w: float = 4000.0) -> None:
+        self._plant = plant
+        self._vehicle = plant.vehicle
+        self._heat_power_w = heat_power_w
+
+    def admissible(self, wish: Command, seen: Observation) -> Command:
+        """Return the admissible command nearest to `wish`."""
+        battery, engine = self._vehicle.battery, self._vehicle.engine
+        net_w = seen.demand_w + battery.aux_power_w
+        least, most = self._battery_range_w(seen.soc)
+        low = max(net_w - most, 0.0)  # engine power without which the battery gives too much
+        high = min(net_w - least, engine.power_max_w)
+        on, p_eng = wish.engine_on, wish.p_eng_w
+        if not p_eng >= 0.0:  # negative or nan
+            p_eng = 0.0
+        if self._too_cold(seen) and not on:
+            on, p_eng = True, self._heat_power_w
+        if on:
+            p_eng = min(p_eng, self._cooling_limit_w(seen))
+        if low > 0.0:
+            on = True
+        if not on or high < engine.power_min_w:
+            # Braking at the charge limit leaves no room for the engine: it must be off.
+            return Command(False, 0.0)
+        return Command(True, min(max(p_eng, low, engine.power_min_w), high))
+
+    def _battery_range_w(self, soc: float) -> tuple[float, float]:
+        """Terminal power the battery may take and give in the next second."""
+        battery = self._vehicle.battery
+        least, most = -battery.power_charge_max_w, battery.power_discharge_max_w
+        if soc < battery.soc_min + SOC_MARGIN:
+            most = 0.0
+        if soc > battery.soc_max - SOC_MARGIN:
+            least = 0.0
+        return least, most
+
+    def _too_cold(self, seen: Observation) -> bool:
+        """Whether a second with the engine off would reach the lower coolant limit."""
+        return seen.t_cl_degc < self._vehicle.thermal.t_cl_min_degc + T_CL_MARGIN_K
+
+    def _cooling_limit_w(self, seen: Observation) -> float:
+        """Engine power at which the coolant no longer warms, near its upper limit only."""
+        plant, thermal = self._plant, self._vehicle.thermal
+        if seen.t_cl_degc < thermal.t_cl_max_degc - T_CL_SOFT_K:
+            return self._vehicle.engine.power_max_w
+        out_w = (
+            plant.air_w(seen.t_cl_degc, seen.speed_mps)
+            + plant.radiator_w(seen.t_cl_degc)
+            + plant.cabin_w(seen.t_cl_degc)
+        )
+        return self._power_for_heat_w(out_w, seen.t_cl_degc)
+
+    def _power_for_heat_w(self, heat_w: float, t_cl_degc: float) -> float:
+        """Largest engine power whose heat into the coolant is at most `heat_w` (bisection)."""
+        low, high = 0.0, self._vehicle.engine.power_max_w
+        factor = alpha_at(self._vehicle.cold_engine, t_cl_degc)
+        factor *= self._vehicle.engine.lhv_j_per_kg * 1e-3
+        share = 1.0 - self._vehicle.thermal.exhaust_share
+        for _ in range(20):
+            middle = 0.5 * (low + high)
+            heat = share * (factor * self._plant.line.fuel.at(middle) - middle)
+            low, high = (middle, high) if heat <= heat_w else (low, middle)
+        return low

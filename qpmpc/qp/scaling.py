@@ -1,0 +1,62 @@
+"""Solver units: the one place where SI quantities are scaled for the QP solver."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Floats = NDArray[np.float64]
+
+
+class ScalingSettings(BaseModel):
+    """Units of the QP's variables.
+
+    Attributes
+    ----------
+    power_w, fuel_g_per_s, soc, t_cl_k : one solver unit of each quantity
+    duration_exponent : a stage's rates are counted in units / h^exponent, so that a long stage's
+        variables, which weigh more, are resolved finer; 1 makes them energies, 0 plain rates
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    power_w: Positive = 10e3
+    fuel_g_per_s: Positive = 1.0
+    soc: Positive = 0.01
+    t_cl_k: Positive = 1.0
+    duration_exponent: Literal[0.0, 0.5, 1.0] = 0.5
+
+
+@dataclass
+class Scaling:
+    """Diagonal scaling of one QP: x = D z, rows E A D z, cost c (q^T D z).
+
+    Attributes
+    ----------
+    column : D, shape (variables,)
+    row : E, shape (rows,)
+    cost : c
+    """
+
+    column: Floats
+    row: Floats
+    cost: float
+
+    def primal(self, z: Floats) -> Floats:
+        """Turn the solver's primal vector into SI units."""
+        return z * self.column
+
+    def dual(self, y: Floats) -> Floats:
+        """Turn the solver's dual vector into grams of fuel per SI unit of each row."""
+        return y * self.row / self.cost
+
+    def solver_primal(self, x: Floats) -> Floats:
+        """Turn a primal vector in SI units into the solver's."""
+        return x / self.column
+
+    def solver_dual(self, dual: Floats) -> Floats:
+        """Turn a dual vector in g per SI unit into the solver's."""
+        return dual / self.row * self.cost

@@ -1,0 +1,275 @@
+"""The multi-horizon QP: values of all its entries, updated in place of being rebuilt."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from qpmpc.preview.stages import Stages
+from qpmpc.pwa.model import PwaModel
+from qpmpc.qp.scaling import Scaling, ScalingSettings
+from qpmpc.qp.structure import VARS, QpStructure, Rows, Var
+from qpmpc.vehicle.battery import BatteryMaps
+from qpmpc.vehicle.parameters import Vehicle
+
+Floats = NDArray[np.float64]
+Weight = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+
+SHORTEST_SCALE_S = 1.0  # a masked stage is scaled as one of 1 s
+ROW_GAP = 1e-2  # K; even a masked coolant row keeps two bounds, so no row turns into an equality
+REACH_MARGIN_SOC = 1e-5
+SIGMA_FORCED = 0.99  # "engine must be on" as a lower bound on sigma, kept apart from the upper one
+
+
+class QpSettings(BaseModel):
+    """Weights and margins of the QP.
+
+    Attributes
+    ----------
+    terminal_low, terminal_high : terminal SOC band as multiples of the initial SOC (paper eq. 11)
+    soc_penalty_g : lambda of a quadratic terminal cost, g per (unit SOC)^2, instead of the band
+    t_cl_margin_k : the coolant is planned to stay this far inside its limits
+    slack_g_per_k : price of a coolant limit exceeded, g per K and stage
+    regularisation : quadratic cost on rates and slack in solver units, far below any fuel
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    terminal_low: Annotated[float, Field(gt=0.0, le=1.5)] = 1.0
+    terminal_high: Annotated[float, Field(gt=0.0, le=1.5)] = 1.01
+    soc_penalty_g: Annotated[float, Field(ge=0.0)] = 0.0
+    t_cl_margin_k: Annotated[float, Field(ge=0.0, le=10.0)] = 0.5
+    slack_g_per_k: Weight = 5.0
+    regularisation: Annotated[float, Field(ge=0.0, le=1.0)] = 1e-3
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """Point about which alpha(T) F is expanded, stage by stage; shape (n,) each.
+
+    Attributes
+    ----------
+    t_cl_degc : mean coolant temperature of the stage
+    fuel_g_per_s : mean nominal fuel rate
+    """
+
+    t_cl_degc: Floats
+    fuel_g_per_s: Floats
+
+
+@dataclass(frozen=True)
+class QpData:
+    """min 1/2 z^T P z + q^T z  s.t.  lower <= A z <= upper, in solver units.
+
+    `hessian` is the diagonal of P; `a_data` the values of A in CSC order.
+    """
+
+    hessian: Floats
+    q: Floats
+    a_data: Floats
+    lower: Floats
+    upper: Floats
+    scaling: Scaling
+
+
+class StageQp:
+    """QP of one trip: structure once, values each step.
+
+    min  sum_k h_k [alpha(T^) F_k + alpha'(T^) F^ T_k] + slack  over the rows of `Rows`
+
+    with T_k the mean coolant temperature of the stage; the source is the paper's problem
+    (eqs. 9-11) after the perspective relaxation of the on/off choice.
+
+    Parameters
+    ----------
+    vehicle, model : plant parameters and the PWA curves made from them
+    stages : number of stages n
+    settings, scaling : weights and units
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        model: PwaModel,
+        stages: int,
+        settings: QpSettings,
+        scaling: ScalingSettings,
+    ) -> None:
+        self.vehicle, self.model, self.settings, self.units = vehicle, model, settings, scaling
+        self.rows = Rows(model.fuel.pieces, model.battery.pieces)
+        self.structure = QpStructure(stages, self.rows)
+        self.stages = stages
+        self._maps = BatteryMaps(vehicle.battery)
+        battery_rows = range(self.rows.battery.start, self.rows.battery.stop)
+        self._battery_on = [self.structure.index[row, Var.ON, False] for row in battery_rows]
+        self._values = self._constant_entries()
+        self._lower, self._upper = self._constant_bounds()
+        self._hessian = np.full((stages, VARS), settings.regularisation)
+        self._hessian[:, [Var.SOC, Var.T_CL]] = 0.0
+        self._unit = np.empty(VARS)
+        self._unit[[Var.SOC, Var.T_CL, Var.T_SLACK]] = scaling.soc, scaling.t_cl_k, scaling.t_cl_k
+        self._unit[[Var.P_ENG, Var.INTERNAL]] = scaling.power_w
+        self._unit[[Var.ON, Var.FUEL]] = 1.0, scaling.fuel_g_per_s
+        self._is_rate = np.isin(np.arange(VARS), [Var.P_ENG, Var.ON, Var.FUEL, Var.INTERNAL])
+
+    def update(self, stages: Stages, soc: float, t_cl_degc: float, about: Linearisation) -> QpData:
+        """Compute all values for a horizon, a state and a linearisation point.
+
+        Parameters
+        ----------
+        stages : the road ahead, n stages
+        soc, t_cl_degc : state at the start of the horizon
+        about : T^ and F^
+
+        Returns
+        -------
+        `QpData` in solver units, with the `Scaling` that leads back
+        """
+        self._fill_battery(stages, soc)
+        self._fill_engine(stages)
+        weights = self._fill_coolant(stages, t_cl_degc, about)
+        cost = np.zeros((self.stages, VARS))
+        cost[:, Var.FUEL], t_cl_weight = weights
+        cost[:, Var.T_CL] = t_cl_weight
+        cost[:-1, Var.T_CL] += t_cl_weight[1:]
+        cost[:, Var.T_SLACK] = self.settings.slack_g_per_k
+        return self._scaled(stages.duration_s, cost)
+
+    def _constant_entries(self) -> Floats:
+        """Entries of A that no step changes; the others are 1 until they are filled in."""
+        index, rows, model = self.structure.index, self.rows, self.model
+        values = np.ones((self.stages, len(index)))
+        values[:, index[rows.soc, Var.SOC, True]] = -1.0
+        values[:, index[rows.p_eng_min, Var.ON, False]] = -self.vehicle.engine.power_min_w
+        values[:, index[rows.t_cl_max, Var.T_SLACK, False]] = -1.0
+        for i, row in enumerate(range(rows.fuel.start, rows.fuel.stop)):
+            values[:, index[row, Var.P_ENG, False]] = -model.fuel.slope[i]
+            values[:, index[row, Var.ON, False]] = -model.fuel.intercept[i]
+        for j, row in enumerate(range(rows.battery.start, rows.battery.stop)):
+            values[:, index[row, Var.P_ENG, False]] = model.battery.slope[j]
+        return values
+
+    def _constant_bounds(self) -> tuple[Floats, Floats]:
+        """Bounds that no step changes; infinite where a row has one side only."""
+        rows, battery, thermal = self.rows, self.vehicle.battery, self.vehicle.thermal
+        lower = np.full((self.stages, rows.count), -np.inf)
+        upper = np.full((self.stages, rows.count), np.inf)
+        lower[:, rows.soc] = upper[:, rows.soc] = 0.0
+        lower[:, rows.fuel] = 0.0
+        upper[:, rows.p_eng_max] = 0.0
+        upper[:, rows.box_on] = 1.0
+        upper[:, rows.box_soc] = battery.soc_max
+        if not self.settings.soc_penalty_g:
+            upper[-1, rows.box_soc] = min(
+                self._terminal(self.settings.terminal_high), battery.soc_max
+            )
+        lower[:, rows.t_cl_min] = thermal.t_cl_min_degc + self.settings.t_cl_margin_k
+        upper[:, rows.t_cl_max] = thermal.t_cl_max_degc - self.settings.t_cl_margin_k
+        lower[:, rows.box_slack] = 0.0
+        return lower, upper
+
+    def _terminal(self, multiple: float) -> float:
+        return multiple * self.vehicle.trip.soc_init
+
+    def _fill_battery(self, stages: Stages, soc: float) -> None:
+        """SOC dynamics, battery pieces in perspective, and SOC limits that can be met."""
+        index, rows, battery = self.structure.index, self.rows, self.vehicle.battery
+        net, h, energy = stages.net_w, stages.duration_s, self.model.battery_energy_j
+        off_w = self.off_power_w(net)
+        self._values[:, index[rows.soc, Var.INTERNAL, False]] = h / energy
+        self._lower[0, rows.soc] = self._upper[0, rows.soc] = soc
+        pieces = self.model.battery
+        self._values[:, self._battery_on] = -(
+            np.multiply.outer(net, pieces.slope) + pieces.intercept - off_w[:, None]
+        )
+        self._lower[:, rows.battery] = off_w[:, None]
+        low = np.full(self.stages, battery.soc_min)
+        if not self.settings.soc_penalty_g:
+            low[-1] = max(self._terminal(self.settings.terminal_low), battery.soc_min)
+        self._lower[:, rows.box_soc] = np.minimum(low, self._reachable_soc(stages, soc))
+
+    def off_power_w(self, net_w: ArrayLike) -> Floats:
+        """Internal battery power with the engine off, l(P0) at the trip's initial SOC, W."""
+        limited = np.minimum(net_w, self.vehicle.battery.power_discharge_max_w)
+        return self._maps.internal_power_w(self.vehicle.trip.soc_init, limited)
+
+    def _reachable_soc(self, stages: Stages, soc: float) -> Floats:
+        """Highest SOC at the end of each stage, charging all the way: a limit above it is moot."""
+        battery, most_w = self.vehicle.battery, self.vehicle.engine.power_max_w
+        strongest = np.maximum(stages.net_w - most_w, -battery.power_charge_max_w)
+        internal = self.model.battery(strongest)
+        gain = stages.duration_s * internal / self.model.battery_energy_j
+        return soc - np.cumsum(gain) - REACH_MARGIN_SOC
+
+    def _fill_engine(self, stages: Stages) -> None:
+        """Power limits of the on-share, and stages that the battery alone cannot drive."""
+        index, rows, battery = self.structure.index, self.rows, self.vehicle.battery
+        engine = self.vehicle.engine
+        most = np.minimum(engine.power_max_w, stages.net_w + battery.power_charge_max_w)
+        self._values[:, index[rows.p_eng_max, Var.ON, False]] = -most
+        missing = stages.net_w - battery.power_discharge_max_w
+        self._lower[:, rows.p_eng_min] = np.maximum(missing - engine.power_min_w, 0.0)
+        self._lower[:, rows.box_on] = np.where(missing > 0.0, SIGMA_FORCED, 0.0)
+
+    def _fill_coolant(
+        self, stages: Stages, t_cl_degc: float, about: Linearisation
+    ) -> tuple[Floats, Floats]:
+        """Coolant balance about T^, F^; returns the cost weights of F and of T at both ends."""
+        index, rows, th = self.structure.index, self.rows, self.vehicle.thermal
+        h, share = stages.duration_s, 1.0 - th.exhaust_share
+        lhv_j_per_g = self.vehicle.engine.lhv_j_per_kg * 1e-3
+        alpha = self.model.alpha(about.t_cl_degc)
+        growth = self.model.alpha.active_slope(about.t_cl_degc) * about.fuel_g_per_s
+        rate = h / th.heat_capacity_j_per_k  # K per W
+        ua = th.ua0_w_per_k + th.ua1_w_per_k_per_mps * stages.speed_mps
+        half = 0.5 * rate * (ua - share * lhv_j_per_g * growth)
+        self._values[:, index[rows.t_cl, Var.T_CL, False]] = 1.0 + half
+        self._values[:, index[rows.t_cl, Var.T_CL, True]] = half - 1.0
+        self._values[:, index[rows.t_cl, Var.FUEL, False]] = -rate * share * lhv_j_per_g * alpha
+        self._values[:, index[rows.t_cl, Var.P_ENG, False]] = rate * share
+        upper = rate * (
+            ua * th.t_amb_degc
+            - share * lhv_j_per_g * growth * about.t_cl_degc
+            - self._cabin_w(about.t_cl_degc)
+        )
+        upper[0] += (1.0 - half[0]) * t_cl_degc
+        radiator = th.radiator_w_per_k * (th.t_cl_max_degc - th.t_amb_degc)
+        self._upper[:, rows.t_cl] = upper
+        self._lower[:, rows.t_cl] = upper - np.maximum(rate * radiator, ROW_GAP)
+        return h * alpha, 0.5 * h * growth
+
+    def _cabin_w(self, t_cl_degc: Floats) -> Floats:
+        th = self.vehicle.thermal
+        span = th.cabin_heat_full_degc - th.cabin_heat_from_degc
+        return th.cabin_heat_w * np.clip((t_cl_degc - th.cabin_heat_from_degc) / span, 0.0, 1.0)
+
+    def _scaled(self, duration_s: Floats, cost: Floats) -> QpData:
+        """Scale to solver units: columns by unit and duration, rows to unit norm, cost to one."""
+        structure, units = self.structure, self.units
+        stretch = np.maximum(duration_s, SHORTEST_SCALE_S) ** -units.duration_exponent
+        column = self._unit * np.where(self._is_rate, stretch[:, None], 1.0)
+        before = np.roll(column, 1, axis=0)
+        entry_scale = np.where(
+            structure.entry_before, before[:, structure.entry_var], column[:, structure.entry_var]
+        )
+        scaled = self._values * entry_scale
+        row = 1.0 / np.sqrt(np.add.reduceat(scaled * scaled, structure.entry_start, axis=1))
+        scaled *= row[:, structure.entry_row]
+        weighted = cost * column
+        scale = 1.0 / max(float(weighted[:, Var.FUEL].max()), 1e-9)
+        hessian = self._hessian.copy()
+        gradient = scale * weighted
+        if self.settings.soc_penalty_g:
+            curvature = 2.0 * self.settings.soc_penalty_g * scale * column[-1, Var.SOC]
+            hessian[-1, Var.SOC] = curvature * column[-1, Var.SOC]
+            gradient[-1, Var.SOC] -= curvature * self.vehicle.trip.soc_init
+        return QpData(
+            hessian=hessian.ravel(),
+            q=gradient.ravel(),
+            a_data=structure.data(scaled),
+            lower=(self._lower * row).ravel(),
+            upper=(self._upper * row).ravel(),
+            scaling=Scaling(column.ravel(), row.ravel(), scale),
+        )

@@ -1,0 +1,172 @@
+"""Results of a run: trajectories, the figures drawn from them, JSON."""
+
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpmpc.controllers.base import Decision
+from qpmpc.vehicle.battery import BatteryMaps
+from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.vehicle.plant import PlantState, StepFlows
+
+Floats = NDArray[np.float64]
+
+COMPARABLE_SHARE = 0.03  # largest SOC correction, as a share of fuel, of a comparable run
+
+
+@dataclass
+class Trajectory:
+    """A run second by second; states have one entry more than steps.
+
+    Attributes
+    ----------
+    soc, t_cl_degc : shape (steps + 1,)
+    all others : shape (steps,); `fallback` is the rung used, empty if none
+    """
+
+    soc: Floats
+    t_cl_degc: Floats
+    engine_on: NDArray[np.bool_]
+    started: NDArray[np.bool_]
+    p_eng_w: Floats
+    p_bat_w: Floats
+    p_friction_w: Floats
+    demand_w: Floats
+    speed_mps: Floats
+    fuel_g: Floats
+    coolant_w: Floats
+    power_excess_w: Floats
+    step_time_s: Floats
+    iterations: NDArray[np.int64]
+    relaxation_gap: Floats
+    sigma: Floats
+    fallback: list[str]
+
+    @classmethod
+    def empty(cls, steps: int) -> Self:
+        """Make a trajectory to be filled in step by step."""
+        kinds = {"engine_on": bool, "started": bool, "iterations": np.int64}
+        arrays: dict[str, Any] = {
+            f.name: np.zeros(steps, dtype=kinds.get(f.name, float))
+            for f in fields(cls)
+            if f.name != "fallback"
+        }
+        arrays["soc"], arrays["t_cl_degc"] = np.zeros(steps + 1), np.zeros(steps + 1)
+        return cls(**arrays, fallback=[""] * steps)
+
+    def store(self, t: int, state: PlantState, flows: StepFlows, decision: Decision) -> None:
+        """Record step `t` and the state it led to."""
+        self.soc[t + 1], self.t_cl_degc[t + 1] = state.soc, state.t_cl_degc
+        self.engine_on[t], self.started[t] = state.engine_on, flows.started
+        self.p_eng_w[t], self.p_bat_w[t] = flows.p_eng_w, flows.p_bat_w
+        self.p_friction_w[t] = flows.p_friction_w
+        self.fuel_g[t], self.coolant_w[t] = flows.fuel_g, flows.coolant_w
+        self.power_excess_w[t] = flows.power_excess_w
+        self.iterations[t] = decision.iterations
+        self.relaxation_gap[t], self.sigma[t] = decision.relaxation_gap, decision.sigma
+        self.fallback[t] = decision.fallback
+
+
+@dataclass
+class Run:
+    """One finished run.
+
+    Attributes
+    ----------
+    cycle, controller, solver : names; solver is empty where there is none
+    vehicle : parameters, overrides included
+    trajectory : second by second
+    """
+
+    cycle: str
+    controller: str
+    solver: str
+    vehicle: Vehicle
+    distance_km: float
+    trajectory: Trajectory
+
+    @property
+    def fuel_g(self) -> float:
+        """Fuel burnt."""
+        return float(self.trajectory.fuel_g.sum())
+
+    @property
+    def soc_correction_g(self) -> float:
+        """(SOC_init - SOC_end) E_bat / (eta_eq LHV): fuel that the battery gave or took."""
+        soc, trip, engine = self.trajectory.soc, self.vehicle.trip, self.vehicle.engine
+        energy_j = BatteryMaps(self.vehicle.battery).energy_j(trip.soc_init)
+        used_j = float(soc[0] - soc[-1]) * energy_j
+        return used_j / (trip.eta_eq * engine.lhv_j_per_kg * 1e-3)
+
+    @property
+    def fuel_soc_balanced_g(self) -> float:
+        """Fuel as if the run had ended at its initial SOC."""
+        return self.fuel_g + self.soc_correction_g
+
+    @property
+    def comparable(self) -> bool:
+        """Whether the SOC correction is small enough for a fair comparison."""
+        return abs(self.soc_correction_g) <= COMPARABLE_SHARE * self.fuel_g
+
+    def summary(self) -> dict[str, Any]:
+        """Return the figures of the run as plain data, ready for JSON.
+
+        `violations` holds the largest excess over each limit, 0 if none; figures that a controller
+        does not have (its relaxation gap, say) are null.
+        """
+        tr, battery, thermal = self.trajectory, self.vehicle.battery, self.vehicle.thermal
+        step_ms = tr.step_time_s * 1e3
+        gap = tr.relaxation_gap[np.isfinite(tr.relaxation_gap)]
+        sigma = tr.sigma[np.isfinite(tr.sigma)]
+        integral = (sigma < INTEGRAL) | (sigma > 1.0 - INTEGRAL)
+        return {
+            "cycle": self.cycle,
+            "controller": self.controller,
+            "vehicle": self.vehicle.name,
+            "distance_km": self.distance_km,
+            "fuel_g": self.fuel_g,
+            "fuel_soc_balanced_g": self.fuel_soc_balanced_g,
+            "comparable": self.comparable,
+            "soc_init": float(tr.soc[0]),
+            "soc_end": float(tr.soc[-1]),
+            "soc_min": float(tr.soc.min()),
+            "soc_max": float(tr.soc.max()),
+            "t_cl_min_degc": float(tr.t_cl_degc.min()),
+            "t_cl_max_degc": float(tr.t_cl_degc.max()),
+            "t_cl_end_degc": float(tr.t_cl_degc[-1]),
+            "engine_starts": int(tr.started.sum()),
+            "engine_on_share": float(tr.engine_on.mean()),
+            "violations": {
+                "soc": _excess(tr.soc[1:], battery.soc_min, battery.soc_max),
+                "t_cl_degc": _excess(
+                    tr.t_cl_degc[1:], thermal.t_cl_min_degc, thermal.t_cl_max_degc
+                ),
+                "power_w": float(tr.power_excess_w.max()),
+            },
+            "fallback_steps": sum(1 for rung in tr.fallback if rung),
+            "relaxation_gap": {"max": _max(gap), "mean": float(gap.mean()) if len(gap) else None},
+            "sigma_integral_share": float(integral.mean()) if len(sigma) else None,
+            "step_time_ms": {
+                "median": float(np.median(step_ms)),
+                "p99": float(np.percentile(step_ms, 99)),
+                "max": float(step_ms.max()),
+            },
+            "solver": {
+                "name": self.solver or None,
+                "iterations_max": int(tr.iterations.max()) if self.solver else None,
+                "iterations_median": float(np.median(tr.iterations)) if self.solver else None,
+            },
+        }
+
+
+INTEGRAL = 0.02  # an on-share within this of 0 or 1 counts as integral
+
+
+def _excess(values: Floats, low: float, high: float) -> float:
+    return float(max(low - values.min(), values.max() - high, 0.0))
+
+
+def _max(values: Floats) -> float | None:
+    return float(values.max()) if len(values) else None

@@ -1,0 +1,78 @@
+"""What every QP backend offers: set up once, then solve with new values, warm-started."""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpmpc.qp.stage_qp import QpData
+from qpmpc.qp.structure import QpStructure
+
+Floats = NDArray[np.float64]
+LARGEST_PLAUSIBLE = 1e6  # solver units are of order one; a failed solver leaves huge numbers
+
+
+class Status(Enum):
+    """Outcome of one solve."""
+
+    SOLVED = "solved"
+    ITERATION_LIMIT = "iteration limit"  # of fixed-iteration solvers: the normal outcome
+    INFEASIBLE = "infeasible"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class QpSolution:
+    """Result of one solve, in solver units.
+
+    Attributes
+    ----------
+    z, y : primal and dual, y > 0 at an active upper bound
+    status : see `Status`
+    iterations : of the solver's own kind
+    solve_s : wall time of the solve alone, s; for reports only, never for decisions
+    """
+
+    z: Floats
+    y: Floats
+    status: Status
+    iterations: int
+    solve_s: float
+
+    @property
+    def usable(self) -> bool:
+        """Whether z may be acted on: solved or stopped at the limit, finite and in range."""
+        return (
+            self.status in (Status.SOLVED, Status.ITERATION_LIMIT)
+            and bool(np.abs(self.z).max() < LARGEST_PLAUSIBLE)
+            and bool(np.abs(self.y).max() < LARGEST_PLAUSIBLE)
+        )
+
+
+class QpSolver(Protocol):
+    """A backend. It never changes the arrays it is given."""
+
+    name: str
+
+    def setup(self, structure: QpStructure, data: QpData) -> None:
+        """Set up for the pattern of `structure`; called once a trip."""
+
+    def solve(
+        self, data: QpData, z: Floats | None, y: Floats | None, cold: bool = False
+    ) -> QpSolution:
+        """Solve with new values, starting at (z, y), or at zero where None.
+
+        `cold` says that the start is far from the solution: a solver with an iteration limit
+        may then use its larger one.
+        """
+
+
+def consistent(data: QpData) -> bool:
+    """Whether the data are fit for a solver: no NaN, and no lower bound above its upper."""
+    return bool(
+        np.isfinite(data.q).all()
+        and np.isfinite(data.a_data).all()
+        and np.all(data.lower <= data.upper)
+    )

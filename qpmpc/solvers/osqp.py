@@ -1,0 +1,117 @@
+"""OSQP, native and persistent, with a fixed number of iterations."""
+
+from time import perf_counter
+from typing import Annotated, Any
+
+import numpy as np
+import osqp
+import scipy.sparse as sp
+from pydantic import BaseModel, ConfigDict, Field
+
+from qpmpc.qp.stage_qp import QpData
+from qpmpc.qp.structure import QpStructure
+from qpmpc.solvers.base import Floats, QpSolution, Status, consistent
+
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+
+_STATUS = {
+    "solved": Status.SOLVED,
+    "solved inaccurate": Status.ITERATION_LIMIT,
+    "maximum iterations reached": Status.ITERATION_LIMIT,
+    "primal infeasible": Status.INFEASIBLE,
+    "primal infeasible inaccurate": Status.INFEASIBLE,
+    "dual infeasible": Status.INFEASIBLE,
+    "dual infeasible inaccurate": Status.INFEASIBLE,
+}
+
+
+class OsqpSettings(BaseModel):
+    """Settings of OSQP. Every step does the same arithmetic: no adaptation, no early exit.
+
+    Attributes
+    ----------
+    iterations : K, iterations a step
+    cold_iterations : iterations of a solve without warm start, at departure
+    rho, sigma, relaxation : ADMM's step size, proximal weight and over-relaxation
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    iterations: Annotated[int, Field(ge=1, le=100_000)] = 50
+    cold_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 4000
+    rho: Positive = 0.03
+    sigma: Positive = 1e-6
+    relaxation: Annotated[float, Field(gt=0.0, lt=2.0)] = 1.6
+
+
+class Osqp:
+    """Backend over the native OSQP interface; one instance serves one trip."""
+
+    name = "osqp"
+
+    def __init__(self, settings: OsqpSettings | None = None) -> None:
+        self.settings = settings or OsqpSettings()
+        self._solver: Any = None
+        self._iterations = 0
+        self._hessian: Floats = np.empty(0)
+
+    def setup(self, structure: QpStructure, data: QpData) -> None:
+        """Set up OSQP without its own scaling, which would differ from step to step."""
+        self._solver = osqp.OSQP()
+        self._iterations = self.settings.iterations
+        self._hessian = data.hessian
+        self._solver.setup(
+            P=sp.diags(np.maximum(data.hessian, TINY), format="csc"),
+            q=data.q,
+            A=structure.matrix_of(data.a_data),
+            l=data.lower,
+            u=data.upper,
+            scaling=0,
+            adaptive_rho=False,
+            check_termination=0,
+            check_dualgap=False,
+            polishing=False,
+            verbose=False,
+            max_iter=self._iterations,
+            rho=self.settings.rho,
+            sigma=self.settings.sigma,
+            alpha=self.settings.relaxation,
+        )
+
+    def solve(
+        self, data: QpData, z: Floats | None, y: Floats | None, cold: bool = False
+    ) -> QpSolution:
+        """Update the values and run exactly K iterations (`cold_iterations` if `cold`)."""
+        if not consistent(data):
+            return _failed(data)
+        self._set_iterations(self.settings.cold_iterations if cold else self.settings.iterations)
+        changed = {} if np.array_equal(data.hessian, self._hessian) else {"Px": data.hessian}
+        self._hessian = data.hessian
+        start = perf_counter()
+        self._solver.update(q=data.q, l=data.lower, u=data.upper, Ax=data.a_data, **changed)
+        self._solver.warm_start(
+            x=np.zeros_like(data.q) if z is None else z,
+            y=np.zeros_like(data.lower) if y is None else y,
+        )
+        result = self._solver.solve()
+        elapsed = perf_counter() - start
+        return QpSolution(
+            z=np.asarray(result.x, dtype=float),
+            y=np.asarray(result.y, dtype=float),
+            status=_STATUS.get(result.info.status, Status.FAILED),
+            iterations=int(result.info.iter),
+            solve_s=elapsed,
+        )
+
+    def _set_iterations(self, count: int) -> None:
+        if count != self._iterations:
+            self._solver.update_settings(max_iter=count)
+            self._iterations = count
+
+
+TINY = 1e-300  # keeps the full diagonal of P in the pattern where it is zero
+
+
+def _failed(data: QpData) -> QpSolution:
+    nothing = np.full_like(data.q, np.nan), np.full_like(data.lower, np.nan)
+    return QpSolution(*nothing, status=Status.FAILED, iterations=0, solve_s=0.0)
