@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from pydantic import BaseModel, ConfigDict
 
+from qpmpc.controllers.balance import balanced
 from qpmpc.controllers.base import Controller
 from qpmpc.controllers.mh_qp import MhQp, MhQpSettings
 from qpmpc.controllers.rule_based import RuleBased, RuleBasedSettings
@@ -72,7 +73,8 @@ SCALARS = {"name", "description"}
 
 
 def _rule_based(plant: Plant, truth: Trace, forecast: Trace, s: ControllerSettings) -> Controller:
-    return RuleBased(plant, s.rule_based)
+    rules = s.rule_based
+    return RuleBased(plant, balanced(plant, truth, rules) if rules.balance else rules)
 
 
 def _mh_qp(plant: Plant, truth: Trace, forecast: Trace, s: ControllerSettings) -> Controller:

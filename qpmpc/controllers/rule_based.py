@@ -18,7 +18,8 @@ class RuleBasedSettings(BaseModel):
     Attributes
     ----------
     k_soc_w : P_r = P_d + P_aux + k_soc (SOC_ref - SOC)
-    soc_ref_offset : SOC_ref - SOC_init; shifting it balances SOC over a given cycle
+    balance : choose SOC_ref for the trip at hand so that it ends at its initial SOC
+    soc_ref_offset : SOC_ref - SOC_init, used as it is without `balance`
     on_w, off_w : the engine starts above the first and stops below the second
     min_on_s : shortest run
     power_min_w : least power when it runs for power
@@ -30,6 +31,7 @@ class RuleBasedSettings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     k_soc_w: Watts = 100e3
+    balance: bool = True
     soc_ref_offset: Annotated[float, Field(ge=-0.3, le=0.3)] = 0.0
     on_w: Watts = 8e3
     off_w: Watts = 3e3

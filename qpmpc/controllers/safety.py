@@ -50,12 +50,10 @@ class SafetyLayer:
     def _battery_range_w(self, soc: float) -> tuple[float, float]:
         """Terminal power the battery may take and give in the next second."""
         battery = self._vehicle.battery
-        least, most = -battery.power_charge_max_w, battery.power_discharge_max_w
+        most = battery.power_discharge_max_w
         if soc < battery.soc_min + SOC_MARGIN:
             most = 0.0
-        if soc > battery.soc_max - SOC_MARGIN:
-            least = 0.0
-        return least, most
+        return -self._plant.battery.charge_limit_w(soc, self._plant.step_s), most
 
     def _too_cold(self, seen: Observation) -> bool:
         """Whether a second with the engine off would reach the lower coolant limit."""

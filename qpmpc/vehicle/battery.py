@@ -22,6 +22,8 @@ class BatteryMaps:
         self.discharge = Table(battery.soc_grid, battery.resistance_discharge_ohm)
         self.charge = Table(battery.soc_grid, battery.resistance_charge_ohm)
         self.charge_c = 3600.0 * battery.capacity_ah
+        self._soc_max = battery.soc_max
+        self._power_charge_max_w = battery.power_charge_max_w
 
     def energy_j(self, soc: float) -> float:
         """Energy of a unit of SOC about `soc`: U_oc(soc) times the capacity, in J."""
@@ -37,6 +39,15 @@ class BatteryMaps:
         resistance = table.at(soc)
         root = voltage * voltage - 4.0 * resistance * power_w
         return (voltage - sqrt(max(root, 0.0))) / (2.0 * resistance)
+
+    def charge_limit_w(self, soc: float, duration_s: float) -> float:
+        """Most power the battery accepts: its limit, or what just fills it to soc_max.
+
+        min(P_chg, I (U + R I)) with I = (soc_max - soc) C_bat / duration, never negative.
+        """
+        current = max(self._soc_max - soc, 0.0) * self.charge_c / duration_s
+        filling = current * (self.open_circuit.at(soc) + self.charge.at(soc) * current)
+        return min(self._power_charge_max_w, filling)
 
     def internal_power_w(self, soc: ArrayLike, power_w: ArrayLike) -> NDArray[np.float64]:
         """Power drawn from the store, G = U_oc I = P + R I^2, for arrays.

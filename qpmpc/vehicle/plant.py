@@ -94,9 +94,10 @@ class Plant:
         M C dT/dt = Q_fuel - P_eng - Q_exh - Q_air - Q_rad - Q_heat (eq. 3),
         Q_fuel = LHV alpha(T) f_fuel(P_eng) (eqs. 4, 5), Q_exh = x (Q_fuel - P_eng).
 
-        Braking power that the battery cannot take goes to the friction brakes. A command beyond
-        the engine's limits is clipped to them; what clipping and the battery leave uncovered is
-        reported as `power_excess_w`.
+        Braking power that the battery cannot take goes to the friction brakes; the battery takes
+        less than its power limit where more would fill it beyond soc_max within the step. A
+        command beyond the engine's limits is clipped to them; what clipping and the battery leave
+        uncovered is reported as `power_excess_w`.
 
         Parameters
         ----------
@@ -112,13 +113,14 @@ class Plant:
         p_eng = min(max(command.p_eng_w, low), high)
         p_bat = demand_w + battery.aux_power_w - p_eng
         friction = 0.0
-        if p_bat < -battery.power_charge_max_w:
-            friction = min(-battery.power_charge_max_w - p_bat, max(-demand_w, 0.0))
+        accepted = self.battery.charge_limit_w(state.soc, h)
+        if p_bat < -accepted:
+            friction = min(-accepted - p_bat, max(-demand_w, 0.0))
             p_bat += friction
         excess = max(
             abs(p_eng - command.p_eng_w),
             p_bat - battery.power_discharge_max_w,
-            -battery.power_charge_max_w - p_bat,
+            -accepted - p_bat,
         )
         started = on and not state.engine_on
         fuel_g = 0.0
