@@ -1,0 +1,125 @@
+"""Coarse grid, then a tube around its trajectory."""
+
+from collections.abc import Callable
+from os import cpu_count
+
+import numpy as np
+
+from qpmpc.cycles import Cycle
+from qpmpc.vehicle import Vehicle
+from qpmpc.verification.dynamic_programming.grid import Grid
+from qpmpc.verification.dynamic_programming.problem import Problem, build_problem
+from qpmpc.verification.dynamic_programming.settings import DpSettings
+from qpmpc.verification.dynamic_programming.solution import CLEARANCE, DpLevel, DpSolution
+from qpmpc.verification.dynamic_programming.sweep import Sweep, Trajectory
+
+MOVES = 6
+MOVES_BEFORE_WIDENING = 2
+WIDENING = 1.5
+
+
+def solve(
+    cycle: Cycle, vehicle: Vehicle, settings: DpSettings, progress: Callable[[float], None]
+) -> DpSolution:
+    """Solve all levels; see `solve_dp` of this package."""
+    problem = build_problem(cycle, vehicle)
+    threads = settings.threads or _cores()
+    power = settings.power_step_w
+    step = (settings.soc_step, settings.t_cl_step_k)
+    coarse = Grid.full(problem, *step, power)
+    width = (settings.tube_soc, settings.tube_t_cl_k)
+    fine = (step[0] / settings.refinement, step[1] / settings.refinement)
+    levels = []
+
+    def run(grid: Grid, begin: float, end: float) -> Trajectory:
+        reached = 0.0
+
+        def report(fraction: float) -> None:
+            nonlocal reached
+            if fraction - reached >= 0.005 or fraction == 1.0:
+                reached = fraction
+                progress(begin + (end - begin) * fraction)
+
+        path = Sweep(problem, grid, threads).run(report)
+        levels.append(_level(grid, path))
+        return path
+
+    if settings.refinement == 1:
+        return _solution(cycle, problem, run(coarse, 0.0, 1.0), levels)
+    done = _share(coarse, _tube(problem, None, width, fine, power))
+    path = run(coarse, 0.0, done)
+    for move in range(MOVES):
+        grid = _tube(problem, path, width, fine, power)
+        # a tube that has to move again takes half of what is left of the progress bar
+        upto = 1.0 if move == MOVES - 1 else done + 0.8 * (1.0 - done)
+        path = run(grid, done, upto)
+        done = upto
+        if levels[-1].clearance >= CLEARANCE:
+            break
+        if move >= MOVES_BEFORE_WIDENING:
+            width = (width[0] * WIDENING, width[1] * WIDENING)
+    progress(1.0)
+    return _solution(cycle, problem, path, levels)
+
+
+def _tube(
+    problem: Problem,
+    path: Trajectory | None,
+    width: tuple[float, float],
+    step: tuple[float, float],
+    power_step_w: float,
+) -> Grid:
+    if path is None:
+        flat = np.full(problem.steps + 1, problem.soc_init)
+        return Grid.around(problem, flat, flat, width, step, power_step_w)
+    return Grid.around(problem, path.soc, path.t_cl_degc, width, step, power_step_w)
+
+
+def _share(coarse: Grid, fine: Grid) -> float:
+    a, b = coarse.shape[0] * coarse.shape[1], fine.shape[0] * fine.shape[1]
+    return a / (a + b)
+
+
+def _level(grid: Grid, path: Trajectory) -> DpLevel:
+    return DpLevel(
+        *grid.shape,
+        grid.soc.spacing,
+        grid.t_cl.spacing,
+        grid.power_step_w,
+        float(path.fuel_g.sum()),
+        path.value_g,
+        min(grid.soc.clearance(path.soc), grid.t_cl.clearance(path.t_cl_degc)),
+    )
+
+
+def _solution(
+    cycle: Cycle, problem: Problem, path: Trajectory, levels: list[DpLevel]
+) -> DpSolution:
+    vehicle, battery = problem.plant.vehicle, problem.plant.battery
+    energy_j = battery.open_circuit(path.soc[:-1]) * battery.charge_c
+    with np.errstate(divide="ignore"):
+        efficiency = energy_j / (path.soc_costate_g * problem.maps.lhv_j_per_g)
+    return DpSolution(
+        cycle=cycle.name,
+        vehicle=vehicle.name,
+        soc=path.soc,
+        t_cl_degc=path.t_cl_degc,
+        engine_on=path.engine_on,
+        p_eng_w=path.p_eng_w,
+        fuel_g=path.fuel_g,
+        soc_costate_g=path.soc_costate_g,
+        soc_efficiency=efficiency,
+        t_cl_costate_g_per_k=path.t_cl_costate_g_per_k,
+        heat_costate_g_per_mj=1e6 * path.t_cl_costate_g_per_k / problem.maps.heat_capacity_j_per_k,
+        levels=tuple(levels),
+        admissible=path.admissible,
+    )
+
+
+def _cores() -> int:
+    try:
+        from os import sched_getaffinity
+
+        return len(sched_getaffinity(0))
+    except ImportError:
+        return cpu_count() or 1

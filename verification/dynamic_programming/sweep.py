@@ -1,0 +1,196 @@
+"""One grid: value function backwards, optimal trajectory forwards on the plant."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import pairwise
+from math import ceil, sqrt
+
+import numpy as np
+
+from qpmpc.vehicle import Command, PlantState
+from qpmpc.verification.dynamic_programming import kernels
+from qpmpc.verification.dynamic_programming.grid import Grid
+from qpmpc.verification.dynamic_programming.kernels import Bools, Cells, Floats, Step
+from qpmpc.verification.dynamic_programming.problem import Problem
+
+Progress = Callable[[float], None]
+
+NODES_WORTH_THREADS = 5_000
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """What the plant does under the policy of one grid; arrays as in `DpSolution`."""
+
+    soc: Floats
+    t_cl_degc: Floats
+    engine_on: Bools
+    p_eng_w: Floats
+    fuel_g: Floats
+    soc_costate_g: Floats
+    t_cl_costate_g_per_k: Floats
+    value_g: float
+    admissible: bool
+
+
+class Sweep:
+    """Bellman recursion on one grid, with memory for O(sqrt(n)) value functions only.
+
+    The backward pass keeps W_k at every L-th time, L = ceil(sqrt(n)). The forward pass computes
+    the values in between once more, segment by segment, as it needs them.
+    """
+
+    def __init__(self, problem: Problem, grid: Grid, threads: int) -> None:
+        self.problem = problem
+        self.grid = grid
+        self.states = 2 if problem.maps.start_fuel_g > 0.0 else 1
+        self.segment = max(1, ceil(sqrt(problem.steps)))
+        rows = grid.soc.points
+        parts = threads if rows * grid.t_cl.points >= NODES_WORTH_THREADS else 1
+        bounds = np.linspace(0, rows, parts + 1).astype(int).tolist()
+        self.chunks = list(pairwise(bounds))
+        self.coast = kernels.coasting_set(
+            problem.maps,
+            problem.demand_w,
+            problem.speed_mps,
+            problem.off_allowed,
+            problem.soc_init,
+        )
+
+    def run(self, progress: Progress) -> Trajectory:
+        """Solve and roll out; `progress` receives the finished fraction."""
+        n, segment = self.problem.steps, self.segment
+        shape = (self.states, *self.grid.shape)
+        total, done = 2 * n, 0
+        with ThreadPoolExecutor(len(self.chunks)) as pool:
+            value = np.zeros(shape)
+            kept = {n: value}
+            for k in range(n - 1, -1, -1):
+                value = self._backward(pool, k, value)
+                if k % segment == 0:
+                    kept[k] = value
+                done += 1
+                progress(done / total)
+            forward = _Forward(self)
+            for start in range(0, n, segment):
+                stop = min(start + segment, n)
+                values = {start: kept[start], stop: kept[stop]}
+                for k in range(stop - 1, start, -1):
+                    values[k] = self._backward(pool, k, values[k + 1])
+                    done += 1
+                    progress(done / total)
+                for k in range(start, stop):
+                    forward.step(k, values[k], values[k + 1])
+        progress(1.0)
+        return forward.result()
+
+    def step(self, k: int) -> Step:
+        """Gather what step k asks for."""
+        problem = self.problem
+        low, high, coolant = self.coast
+        return Step(
+            float(problem.demand_w[k]),
+            float(problem.speed_mps[k]),
+            float(problem.power_low_w[k]),
+            float(problem.power_high_w[k]),
+            self.grid.power_count(problem, k),
+            bool(problem.on_allowed[k]),
+            bool(problem.off_allowed[k]),
+            k == problem.steps - 1,
+            float(low[k + 1]),
+            float(high[k + 1]),
+            float(coolant[k + 1]),
+        )
+
+    def coasts(self, k: int, soc: float, t_cl_degc: float) -> bool:
+        """Tell whether the rest of the cycle is driven with the engine off from this state."""
+        low, high, coolant = self.coast
+        slack = 0.1 * kernels.MARGIN
+        return bool(low[k] - slack <= soc <= high[k] + slack and t_cl_degc >= coolant[k] - slack)
+
+    def _backward(self, pool: ThreadPoolExecutor, k: int, following: Floats) -> Floats:
+        maps, grid, step = self.problem.maps, self.grid, self.step(k)
+        soc_axis, t_axis = grid.soc.nodes(k), grid.t_cl.nodes(k)
+        target = grid.lattice(k + 1)
+        table = (self.states, step.power_count + 1, len(t_axis))
+        fuel: Floats = np.empty(table)
+        weight: Floats = np.empty(table)
+        column: Cells = np.empty(table, dtype=np.uint32)
+        kernels.temperature_tables(
+            maps, step, t_axis, target, grid.t_cl.points, fuel, column, weight
+        )
+        value = np.empty_like(following)
+
+        def rows(first: int, stop: int) -> None:
+            kernels.bellman_rows(
+                first, stop, maps, step, soc_axis, t_axis, target,
+                fuel, column, weight, following, value,
+            )  # fmt: skip
+
+        jobs = [pool.submit(rows, *chunk) for chunk in self.chunks[1:]]
+        rows(*self.chunks[0])
+        for job in jobs:
+            job.result()
+        return value
+
+
+class _Forward:
+    """The plant, driven step by step by the policy that the value function implies."""
+
+    def __init__(self, sweep: Sweep) -> None:
+        problem = sweep.problem
+        n = problem.steps
+        self.sweep = sweep
+        self.state = PlantState(problem.soc_init, problem.t_cl_init_degc)
+        self.soc, self.t_cl_degc = np.empty(n + 1), np.empty(n + 1)
+        self.engine_on = np.zeros(n, dtype=np.bool_)
+        self.p_eng_w, self.fuel_g = np.zeros(n), np.zeros(n)
+        self.soc_costate, self.t_cl_costate = np.zeros(n), np.zeros(n)
+        self.value_g = 0.0
+        self.admissible = True
+
+    def step(self, k: int, value: Floats, following: Floats) -> None:
+        sweep, state = self.sweep, self.state
+        problem, grid = sweep.problem, sweep.grid
+        soc, t_cl = state.soc, state.t_cl_degc
+        self.soc[k], self.t_cl_degc[k] = soc, t_cl
+        if sweep.coasts(k, soc, t_cl):
+            command, admissible = Command(False, 0.0), True
+            # only the final-SOC constraint holds the state here: its multiplier does not change
+            self.soc_costate[k] = self.soc_costate[k - 1] if k > 0 else 0.0
+        else:
+            target = grid.lattice(k + 1)
+            cost, on, power, admissible = kernels.best_command(
+                problem.maps, sweep.step(k), (soc, t_cl), state.engine_on, following, target
+            )
+            command = Command(on, power)
+            if k == 0:
+                self.value_g = cost
+            before = 1 if state.engine_on and sweep.states == 2 else 0
+            lattice = grid.lattice(k)
+            row = (soc - lattice.soc_origin) / lattice.soc_spacing
+            column = (t_cl - lattice.t_cl_origin) / lattice.t_cl_spacing
+            by_row, by_column = kernels.gradient(value[before], row, column)
+            self.soc_costate[k] = -by_row / lattice.soc_spacing
+            self.t_cl_costate[k] = -by_column / lattice.t_cl_spacing
+        self.state, flows = problem.plant.step(
+            state, command, float(problem.demand_w[k]), float(problem.speed_mps[k])
+        )
+        self.engine_on[k], self.p_eng_w[k] = command.engine_on, flows.p_eng_w
+        self.fuel_g[k] = flows.fuel_g
+        self.admissible &= admissible and flows.power_excess_w == 0.0
+
+    def result(self) -> Trajectory:
+        self.soc[-1], self.t_cl_degc[-1] = self.state.soc, self.state.t_cl_degc
+        return Trajectory(
+            self.soc,
+            self.t_cl_degc,
+            self.engine_on,
+            self.p_eng_w,
+            self.fuel_g,
+            self.soc_costate,
+            self.t_cl_costate,
+            self.value_g,
+            self.admissible,
+        )
