@@ -1,8 +1,8 @@
 """Find a cycle by its shipped name or its file."""
 
+import os
 from functools import cache
 from importlib.resources import as_file, files
-from os import PathLike, fspath
 from pathlib import Path
 
 from qpmpc.cycles.breakpoints import read_breakpoints
@@ -12,7 +12,7 @@ from qpmpc.cycles.read_csv import read_csv
 from qpmpc.errors import InputError
 
 
-def load_cycle(name_or_path: str | PathLike[str]) -> Cycle:
+def load_cycle(name_or_path: str | os.PathLike[str]) -> Cycle:
     """Load a shipped cycle by its name, or a user's CSV file by its path.
 
     The columns of a CSV file are ``time_s,speed_mps[,grade]``; see `read_csv`.
@@ -27,12 +27,13 @@ def load_cycle(name_or_path: str | PathLike[str]) -> Cycle:
     InputError
         If it is neither, or the file cannot be used; one line says why and what is allowed.
     """
-    name = fspath(name_or_path)
+    name = os.fspath(name_or_path)
     for entry in catalogue():
         if entry.name == name:
             return _shipped(entry)
     path = Path(name)
-    if not path.exists() and path.suffix == "" and path.name == name:
+    # os.path: unlike Path.exists it does not raise on an impossible name
+    if path.suffix == "" and path.name == name and not os.path.exists(name):  # noqa: PTH110
         raise InputError(
             f"unknown cycle {name!r}: give one of {', '.join(cycle_names())}, or a CSV file"
         )

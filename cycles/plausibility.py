@@ -32,10 +32,10 @@ DURATION_MAX_S = 86400.0
 POWER_P95_MAX_WPKG = 35.0
 """Largest 95th percentile of ``v a`` over the accelerating seconds of a genuine drive.
 
-It is the statistic by which the EU's real driving emissions test (Regulation (EU) 2017/1151,
-Annex IIIA) refuses aggressive driving, above 14 to 30 W/kg depending on the mean speed. The shipped
-cycles have 8 to 13 W/kg and the aggressive US06 about 26. Calling km/h metres a second multiplies
-it by 3.6^2 = 13, calling mph so by 5: the shipped cycles then have at least 41.
+By the same statistic the EU's real driving emissions test (Regulation (EU) 2017/1151, Annex IIIA)
+refuses aggressive driving, above 14 to 29 W/kg depending on the mean speed. The shipped cycles have
+8 to 13 W/kg, the aggressive US06 schedule of the EPA 26. To call km/h metres a second multiplies it
+by 3.6^2 = 13, to call mph so by 5: the shipped cycles then have at least 41.
 """
 
 POWER_SECONDS_MIN = 60
@@ -46,7 +46,7 @@ ACCELERATING_MPS2 = 0.1
 MOVING_SPEED_MEAN_MAX_MPS = 50.0
 """180 km/h on average while moving."""
 
-UNIT_HINT = "are they m/s? Divide km/h by 3.6, multiply mph by 0.44704"
+TO_MPS = "to get m/s, divide km/h by 3.6 or multiply mph by 0.44704"
 
 
 def check_samples(
@@ -67,14 +67,14 @@ def check_samples(
         At the first sample that is out of range.
     """
     step_s = np.diff(time_s)
-    _refuse(path, lines[1:], step_s <= 0, time_s[1:], "time_s is {:g}, must increase strictly")
+    _refuse(path, lines[1:], step_s <= 0, time_s[1:], "time_s is {:.10g}, must increase strictly")
     _refuse(path, lines, speed_mps < 0, speed_mps, "speed_mps is {:g}, must not be negative")
     _refuse(
         path,
         lines,
         speed_mps > SPEED_MAX_MPS,
         speed_mps,
-        f"speed_mps is {{:g}}, must be 0 to {SPEED_MAX_MPS:g}; {UNIT_HINT}",
+        f"speed_mps is {{:g}}, must be 0 to {SPEED_MAX_MPS:g} m/s; {TO_MPS}",
     )
     _refuse(
         path,
@@ -124,14 +124,14 @@ def check_motion(path: Path, lines: Sequence[int], time_s: Floats, cycle: Cycle)
             raise InputError(
                 f"{path}: one accelerating second in twenty takes over {power_wpkg:.0f} W/kg, "
                 f"on the road that is at most {POWER_P95_MAX_WPKG:g}; the speeds look like km/h or "
-                f"mph: {UNIT_HINT}"
+                f"mph: {TO_MPS}"
             )
     moving = speed > 0
     mean_mps = float(np.mean(speed[moving])) if np.any(moving) else 0.0
     if mean_mps > MOVING_SPEED_MEAN_MAX_MPS:
         raise InputError(
             f"{path}: the mean speed while moving is {mean_mps:.0f}, must be at most "
-            f"{MOVING_SPEED_MEAN_MAX_MPS:g} m/s; the speeds look like km/h or mph: {UNIT_HINT}"
+            f"{MOVING_SPEED_MEAN_MAX_MPS:g} m/s; the speeds look like km/h or mph: {TO_MPS}"
         )
     if np.any(np.abs(accel) > ACCEL_MAX_MPS2):
         k = int(np.argmax(np.abs(accel) > ACCEL_MAX_MPS2))
@@ -139,7 +139,7 @@ def check_motion(path: Path, lines: Sequence[int], time_s: Floats, cycle: Cycle)
         line = lines[min(last, len(lines) - 1)]
         raise InputError(
             f"{path}, line {line}: the speed changes by {accel[k]:.1f} m/s in a second, at most "
-            f"{ACCEL_MAX_MPS2:g} are allowed: a wrong sample, or {UNIT_HINT}"
+            f"{ACCEL_MAX_MPS2:g} are allowed; a wrong sample, or a wrong unit: {TO_MPS}"
         )
 
 
