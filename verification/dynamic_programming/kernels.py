@@ -20,6 +20,7 @@ INF = np.inf
 ONE = np.uint32(1)
 EDGE = 1e-9  # tolerance at the edge of a grid, in cells
 MARGIN = 1e-9  # kept from the limits, so that rounding cannot cross them
+ROUNDING = 1e-14  # at SOC_max, where the brakes hold the battery exactly
 BISECTIONS = 60
 BLOCK = 16  # rows that share one pass over the tables, to stay in the processor's cache
 REFINEMENTS = 4
@@ -75,8 +76,8 @@ class Lattice(NamedTuple):
 class Step(NamedTuple):
     """What one second asks for, which engine powers are allowed, and how many of them to try.
 
-    `coast_*` bound the states at its end from which the rest is driven with the engine off;
-    `coast_soc` is infinite where there are none.
+    `coast_*` are the least SOC and T at its end from which the rest is driven with the engine off,
+    infinite where there are none.
     """
 
     demand_w: float
@@ -88,7 +89,6 @@ class Step(NamedTuple):
     off_allowed: bool
     last: bool
     coast_soc: float
-    coast_soc_max: float
     coast_t_cl_degc: float
 
 
@@ -148,13 +148,7 @@ def next_t_cl(maps: Maps, t_cl: float, fuel_g: float, power_w: float, losses: fl
 
 
 @compiled
-def battery_w(maps: Maps, demand_w: float, power_w: float) -> float:
-    """P_bat = P_d + P_aux - P_eng, the friction brakes taking what exceeds the charge limit."""
-    return max(demand_w + maps.aux_power_w - power_w, -maps.power_charge_max_w)
-
-
-@compiled
-def next_soc(maps: Maps, soc: float, p_bat_w: float) -> float:
+def soc_after(maps: Maps, soc: float, p_bat_w: float) -> float:
     """SOC - I / C_bat with I = [U - sqrt(U^2 - 4 R P)] / (2 R), paper eq. (1)."""
     voltage = table(soc, maps.soc_grid, maps.open_circuit_v)
     if p_bat_w >= 0.0:
@@ -166,8 +160,22 @@ def next_soc(maps: Maps, soc: float, p_bat_w: float) -> float:
 
 
 @compiled
+def next_soc(maps: Maps, soc: float, demand_w: float, power_w: float) -> float:
+    """SOC after a step with P_bat = P_d + P_aux - P_eng; the brakes take what it cannot.
+
+    Friction brakes take the part of a braking demand that exceeds the charge limit, or would
+    fill the battery beyond SOC_max.
+    """
+    idle_w = maps.aux_power_w - power_w
+    after = soc_after(maps, soc, max(demand_w + idle_w, -maps.power_charge_max_w))
+    if after > maps.soc_max and demand_w < 0.0:
+        after = max(maps.soc_max, soc_after(maps, soc, idle_w))
+    return after
+
+
+@compiled
 def power_to_reach(maps: Maps, soc: float, demand_w: float, soc_end: float) -> float:
-    """Engine power with which the step ends at `soc_end`, the inverse of `next_soc`.
+    """Engine power with which the step ends at `soc_end`, the inverse of `soc_after`.
 
     P_bat = U I - R I^2 with I = (SOC - SOC_end) C_bat.
     """
@@ -189,7 +197,7 @@ def off_step(maps: Maps, demand_w: float, speed_mps: float, coolant: bool, x: fl
     """T, or else SOC, after a step with the engine off; it increases with x."""
     if coolant:
         return next_t_cl(maps, x, 0.0, 0.0, losses_w(maps, x, speed_mps))
-    return next_soc(maps, x, battery_w(maps, demand_w, 0.0))
+    return next_soc(maps, x, demand_w, 0.0)
 
 
 @compiled
@@ -198,61 +206,46 @@ def off_step_inverse(
     demand_w: float,
     speed_mps: float,
     coolant: bool,
-    bounds: tuple[float, float],
+    low: float,
+    high: float,
     end: float,
-    greatest: bool,
 ) -> float:
-    """Return the least x in bounds with off_step(x) >= end, or the greatest with <= end.
-
-    Infinite, with the sign that allows nothing, if there is none.
-    """
-    low, high = bounds
-    at_low = off_step(maps, demand_w, speed_mps, coolant, low)
-    at_high = off_step(maps, demand_w, speed_mps, coolant, high)
-    if greatest:
-        if at_low > end:
-            return -INF
-        if at_high <= end:
-            return high
-    else:
-        if at_high < end:
-            return INF
-        if at_low >= end:
-            return low
+    """Return the least x in low..high with off_step(x) >= end; infinity if there is none."""
+    if off_step(maps, demand_w, speed_mps, coolant, high) < end:
+        return INF
+    if off_step(maps, demand_w, speed_mps, coolant, low) >= end:
+        return low
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        after = off_step(maps, demand_w, speed_mps, coolant, middle)
-        if after < end or (greatest and after == end):
+        if off_step(maps, demand_w, speed_mps, coolant, middle) < end:
             low = middle
         else:
             high = middle
-    return low if greatest else high
+    return high
 
 
 @compiled
 def coasting_set(
     maps: Maps, demand_w: Floats, speed_mps: Floats, off_allowed: Bools, soc_end: float
-) -> tuple[Floats, Floats, Floats]:
-    """Least SOC, greatest SOC and least T at k = 0..n from which the rest is driven engine off.
+) -> tuple[Floats, Floats]:
+    """Least SOC and least T at k = 0..n from which the rest is driven with the engine off.
 
-    SOC*_n = soc_end and SOC*_k - I(SOC*_k, P_d + P_aux)/C_bat = SOC*_{k+1}; the other two
-    likewise from SOC_max and T_min. The least SOC is infinite where there is no such state.
-    Shapes (n+1,).
+    SOC*_n = soc_end and SOC*_k - I(SOC*_k, P_d + P_aux)/C_bat = SOC*_{k+1}; T* likewise, from
+    T_min. Both are infinite where there is no such state. Shapes (n+1,).
     """
     n = len(demand_w)
-    low, high, coolant = np.full(n + 1, INF), np.full(n + 1, -INF), np.full(n + 1, INF)
-    low[n], high[n] = soc_end + MARGIN, maps.soc_max - MARGIN
-    coolant[n] = maps.t_cl_min_degc + MARGIN
-    soc, t_cl = (maps.soc_min, maps.soc_max), (maps.t_cl_min_degc, maps.t_cl_max_degc)
+    soc, t_cl = np.full(n + 1, INF), np.full(n + 1, INF)
+    soc[n], t_cl[n] = soc_end + MARGIN, maps.t_cl_min_degc + MARGIN
     for k in range(n - 1, -1, -1):
         p, v = demand_w[k], speed_mps[k]
-        least = off_step_inverse(maps, p, v, False, soc, low[k + 1], False)
-        most = off_step_inverse(maps, p, v, False, soc, high[k + 1], True)
-        warm = off_step_inverse(maps, p, v, True, t_cl, coolant[k + 1], False)
-        if not off_allowed[k] or least > most or warm == INF:
+        charged = off_step_inverse(maps, p, v, False, maps.soc_min, maps.soc_max, soc[k + 1])
+        warm = off_step_inverse(
+            maps, p, v, True, maps.t_cl_min_degc, maps.t_cl_max_degc, t_cl[k + 1]
+        )
+        if not off_allowed[k] or charged == INF or warm == INF:
             break
-        low[k], high[k], coolant[k] = least, most, warm
-    return low, high, coolant
+        soc[k], t_cl[k] = charged, warm
+    return soc, t_cl
 
 
 @compiled
@@ -287,7 +280,8 @@ def landing(maps: Maps, step: Step, soc: float, t_cl: float, start_g: float) -> 
         fuel = factor * hot_fuel_g(maps, power) + start_g
     if next_t_cl(maps, t_cl, fuel, power, losses) > maps.t_cl_max_degc - MARGIN:
         return nothing
-    if next_soc(maps, soc, battery_w(maps, step.demand_w, power)) > step.coast_soc_max:
+    after = next_soc(maps, soc, step.demand_w, power)
+    if not step.coast_soc - 0.1 * MARGIN <= after <= maps.soc_max + ROUNDING:
         return nothing
     return fuel, power
 
@@ -359,14 +353,14 @@ def command_cost(
     states, rows, columns = following.shape
     fuel = alpha(maps, t_cl) * hot_fuel_g(maps, power) + start_g if on else 0.0
     t_end = next_t_cl(maps, t_cl, fuel, power, losses_w(maps, t_cl, step.speed_mps))
-    soc_end = next_soc(maps, soc, battery_w(maps, step.demand_w, power))
+    soc_end = next_soc(maps, soc, step.demand_w, power)
     row = (soc_end - target.soc_origin) / target.soc_spacing
     column = (t_end - target.t_cl_origin) / target.t_cl_spacing
     if strict:
         if (
             outside(row, rows)
             or outside(column, columns)
-            or not maps.soc_min + MARGIN <= soc_end <= maps.soc_max - MARGIN
+            or not maps.soc_min + MARGIN <= soc_end <= maps.soc_max + ROUNDING
             or not maps.t_cl_min_degc + MARGIN <= t_end <= maps.t_cl_max_degc - MARGIN
         ):
             return INF
@@ -489,10 +483,9 @@ def bellman_rows(
             if not (step.on_allowed if u > 0 else step.off_allowed):
                 continue
             power = grid_power_w(step, u - 1) if u > 0 else 0.0
-            p_bat = battery_w(maps, step.demand_w, power)
             after = 1 if u > 0 and states == 2 else 0
             for i in range(begin, end):
-                soc = next_soc(maps, soc_axis[i], p_bat)
+                soc = next_soc(maps, soc_axis[i], step.demand_w, power)
                 position = (soc - target.soc_origin) / target.soc_spacing
                 if outside(position, rows):
                     continue

@@ -88,7 +88,7 @@ class Sweep:
     def step(self, k: int) -> Step:
         """Gather what step k asks for."""
         problem = self.problem
-        low, high, coolant = self.coast
+        soc, t_cl = self.coast
         return Step(
             float(problem.demand_w[k]),
             float(problem.speed_mps[k]),
@@ -98,16 +98,14 @@ class Sweep:
             bool(problem.on_allowed[k]),
             bool(problem.off_allowed[k]),
             k == problem.steps - 1,
-            float(low[k + 1]),
-            float(high[k + 1]),
-            float(coolant[k + 1]),
+            float(soc[k + 1]),
+            float(t_cl[k + 1]),
         )
 
     def coasts(self, k: int, soc: float, t_cl_degc: float) -> bool:
         """Tell whether the rest of the cycle is driven with the engine off from this state."""
-        low, high, coolant = self.coast
         slack = 0.1 * kernels.MARGIN
-        return bool(low[k] - slack <= soc <= high[k] + slack and t_cl_degc >= coolant[k] - slack)
+        return bool(soc >= self.coast[0][k] - slack and t_cl_degc >= self.coast[1][k] - slack)
 
     def _backward(self, pool: ThreadPoolExecutor, k: int, following: Floats) -> Floats:
         maps, grid, step = self.problem.maps, self.grid, self.step(k)
