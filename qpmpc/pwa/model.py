@@ -20,13 +20,22 @@ ALPHA_HOTTEST_DEGC = 95.0
 
 
 class PwaTolerances(BaseModel):
-    """Largest PWA errors; the number of pieces follows from them."""
+    """Largest PWA errors; the number of pieces follows from them.
+
+    Attributes
+    ----------
+    fuel_g_per_s, fuel_knee_w : fuel may be off by the first, and beyond this power, where the
+        engine seldom runs, by the first times (P / knee)^2
+    battery_w, battery_share : internal power may be off by the first plus a share of the power
+    alpha : cold multiplier
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    fuel_g_per_s: Tolerance = 0.005
-    battery_w: Tolerance = 40.0
-    battery_share: Annotated[float, Field(ge=0.0, le=0.1)] = 0.01
+    fuel_g_per_s: Tolerance = 0.0015
+    fuel_knee_w: Tolerance = 20e3
+    battery_w: Tolerance = 20.0
+    battery_share: Annotated[float, Field(ge=0.0, le=0.1)] = 0.005
     alpha: Tolerance = 0.001
 
 
@@ -56,7 +65,11 @@ class PwaModel:
         power, internal = battery_samples(vehicle)
         temperature, multiplier = alpha_samples(vehicle)
         return cls(
-            fuel=fit_convex(line.power_w, line.fuel_g_per_s, tol.fuel_g_per_s),
+            fuel=fit_convex(
+                line.power_w,
+                line.fuel_g_per_s,
+                tol.fuel_g_per_s * np.maximum(line.power_w / tol.fuel_knee_w, 1.0) ** 2,
+            ),
             battery=fit_convex(
                 power,
                 internal,

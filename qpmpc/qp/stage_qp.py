@@ -42,7 +42,7 @@ class QpSettings(BaseModel):
     soc_penalty_g: Annotated[float, Field(ge=0.0)] = 0.0
     t_cl_margin_k: Annotated[float, Field(ge=0.0, le=10.0)] = 0.5
     slack_g_per_k: Weight = 5.0
-    regularisation: Annotated[float, Field(ge=0.0, le=1.0)] = 1e-3
+    regularisation: Annotated[float, Field(ge=0.0, le=1.0)] = 1e-5
 
 
 @dataclass(frozen=True)

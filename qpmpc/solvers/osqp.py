@@ -5,12 +5,12 @@ from typing import Annotated, Any
 
 import numpy as np
 import osqp
-import scipy.sparse as sp
 from pydantic import BaseModel, ConfigDict, Field
 
 from qpmpc.qp.stage_qp import QpData
 from qpmpc.qp.structure import QpStructure
-from qpmpc.solvers.base import Floats, QpSolution, Status, consistent
+from qpmpc.solvers.base import Floats, QpSolution, Status, consistent, failed
+from qpmpc.solvers.forms import hessian_matrix
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
@@ -39,7 +39,7 @@ class OsqpSettings(BaseModel):
 
     iterations: Annotated[int, Field(ge=1, le=100_000)] = 50
     cold_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 4000
-    rho: Positive = 0.03
+    rho: Positive = 0.1
     sigma: Positive = 1e-6
     relaxation: Annotated[float, Field(gt=0.0, lt=2.0)] = 1.6
 
@@ -61,7 +61,7 @@ class Osqp:
         self._iterations = self.settings.iterations
         self._hessian = data.hessian
         self._solver.setup(
-            P=sp.diags(np.maximum(data.hessian, TINY), format="csc"),
+            P=hessian_matrix(data),
             q=data.q,
             A=structure.matrix_of(data.a_data),
             l=data.lower,
@@ -83,35 +83,29 @@ class Osqp:
     ) -> QpSolution:
         """Update the values and run exactly K iterations (`cold_iterations` if `cold`)."""
         if not consistent(data):
-            return _failed(data)
+            return failed(data)
         self._set_iterations(self.settings.cold_iterations if cold else self.settings.iterations)
         changed = {} if np.array_equal(data.hessian, self._hessian) else {"Px": data.hessian}
         self._hessian = data.hessian
         start = perf_counter()
         self._solver.update(q=data.q, l=data.lower, u=data.upper, Ax=data.a_data, **changed)
+        updated = perf_counter()
         self._solver.warm_start(
             x=np.zeros_like(data.q) if z is None else z,
             y=np.zeros_like(data.lower) if y is None else y,
         )
         result = self._solver.solve()
-        elapsed = perf_counter() - start
+        done = perf_counter()
         return QpSolution(
             z=np.asarray(result.x, dtype=float),
             y=np.asarray(result.y, dtype=float),
             status=_STATUS.get(result.info.status, Status.FAILED),
             iterations=int(result.info.iter),
-            solve_s=elapsed,
+            solve_s=done - updated,
+            update_s=updated - start,
         )
 
     def _set_iterations(self, count: int) -> None:
         if count != self._iterations:
             self._solver.update_settings(max_iter=count)
             self._iterations = count
-
-
-TINY = 1e-300  # keeps the full diagonal of P in the pattern where it is zero
-
-
-def _failed(data: QpData) -> QpSolution:
-    nothing = np.full_like(data.q, np.nan), np.full_like(data.lower, np.nan)
-    return QpSolution(*nothing, status=Status.FAILED, iterations=0, solve_s=0.0)
