@@ -117,7 +117,7 @@ class Run:
         does not have (its relaxation gap, say) are null.
         """
         tr, battery, thermal = self.trajectory, self.vehicle.battery, self.vehicle.thermal
-        step_ms = tr.step_time_s * 1e3
+        step_ms = tr.step_time_s[np.isfinite(tr.step_time_s)] * 1e3
         gap = tr.relaxation_gap[np.isfinite(tr.relaxation_gap)]
         sigma = tr.sigma[np.isfinite(tr.sigma)]
         integral = (sigma < INTEGRAL) | (sigma > 1.0 - INTEGRAL)
@@ -149,9 +149,9 @@ class Run:
             "relaxation_gap": {"max": _max(gap), "mean": float(gap.mean()) if len(gap) else None},
             "sigma_integral_share": float(integral.mean()) if len(sigma) else None,
             "step_time_ms": {
-                "median": float(np.median(step_ms)),
-                "p99": float(np.percentile(step_ms, 99)),
-                "max": float(step_ms.max()),
+                "median": float(np.median(step_ms)) if len(step_ms) else None,
+                "p99": float(np.percentile(step_ms, 99)) if len(step_ms) else None,
+                "max": _max(step_ms),
             },
             "solver": {
                 "name": self.solver or None,

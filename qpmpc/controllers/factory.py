@@ -15,6 +15,7 @@ from qpmpc.qp.stage_qp import QpSettings
 from qpmpc.settings import apply_settings, validated
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.plant import Plant
+from qpmpc.verification.dynamic_programming.settings import DpSettings
 
 PAPER = MhQpSettings(
     horizon=HorizonSettings(short_stages=20, blocks=0, block_s=20, classes=1),
@@ -30,6 +31,7 @@ class ControllerSettings(BaseModel):
     rule_based: RuleBasedSettings = RuleBasedSettings()
     mh_qp: MhQpSettings = MhQpSettings()
     mh_qp_paper: MhQpSettings = PAPER
+    dp: DpSettings = DpSettings()
 
     def with_settings(self, settings: dict[str, object]) -> "ControllerSettings":
         """Return a copy with dotted keys replaced, e.g. ``{"mh_qp.osqp.iterations": 25}``.

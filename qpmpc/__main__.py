@@ -1,0 +1,5 @@
+"""``python -m qpmpc`` is the command ``qpmpc``."""
+
+from qpmpc.cli import main
+
+main()

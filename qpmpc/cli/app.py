@@ -1,0 +1,99 @@
+"""The command `qpmpc`: its commands, and how errors become one line and an exit code."""
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import Annotated, NoReturn
+
+import typer
+
+from qpmpc import __version__
+from qpmpc.cli.compare import compare
+from qpmpc.cli.cycles import cycles
+from qpmpc.cli.simulate import simulate
+from qpmpc.cli.vehicles import vehicles
+from qpmpc.errors import InputError, QpmpcError
+
+DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+DEBUG_VARIABLE = "QPMPC_DEBUG"
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="Multi-horizon MPC, posed as a QP, for the power and heat of hybrid cars.",
+    epilog="Exit codes: 0 done, 2 bad input or usage, 1 anything else, 130 interrupted. "
+    f"With {DEBUG_VARIABLE}=1 in the environment an error shows its traceback.",
+)
+app.command()(simulate)
+app.command()(compare)
+app.command()(cycles)
+app.command()(vehicles)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"qpmpc-iptm {__version__}")
+        raise typer.Exit()
+
+
+@app.callback()
+def _common(
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Show the version.", callback=_version, is_eager=True),
+    ] = False,
+) -> None:
+    """Options of `qpmpc` itself."""
+
+
+def main(args: Sequence[str] | None = None) -> NoReturn:
+    """Run the command line and exit: 0 done, 2 bad input, 1 anything else, 130 interrupted.
+
+    Parameters
+    ----------
+    args : without the program's name; those of the process if None
+    """
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="replace")
+    try:
+        code = typer.main.get_command(app).main(
+            args=None if args is None else list(args), prog_name="qpmpc", standalone_mode=False
+        )
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # The reader, `head` for one, has left: nothing is wrong, but nothing more can be said.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(DONE)
+    except (KeyboardInterrupt, typer.Abort):
+        _say("interrupted")
+        sys.exit(INTERRUPTED)
+    except Exception as error:
+        if os.environ.get(DEBUG_VARIABLE):
+            raise
+        _say(_one_line(error))
+        sys.exit(_exit_code(error))
+    if code == INTERRUPTED:  # newer versions of typer return it
+        _say("interrupted")
+    sys.exit(code or DONE)
+
+
+def _exit_code(error: Exception) -> int:
+    # Errors of usage are typer's own or click's, depending on the version: both have exit_code.
+    return BAD_INPUT if isinstance(error, InputError) else getattr(error, "exit_code", FAILED)
+
+
+def _one_line(error: Exception) -> str:
+    if isinstance(error, QpmpcError):
+        return str(error)
+    if hasattr(error, "format_message"):
+        command = getattr(getattr(error, "ctx", None), "command_path", "qpmpc")
+        return f"{error.format_message().rstrip('.')} (see {command} --help)"
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {error.strerror}"
+    return f"{type(error).__name__}: {error} ({DEBUG_VARIABLE}=1 shows where)"
+
+
+def _say(text: str) -> None:
+    print(f"qpmpc: {' '.join(text.split())}", file=sys.stderr)

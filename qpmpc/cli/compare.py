@@ -1,0 +1,74 @@
+"""``qpmpc compare``: several controllers on several cycles."""
+
+from typing import Annotated
+
+import typer
+
+from qpmpc.cli.options import JsonOption, OutOption, SetOption, VehicleOption
+
+DEFAULT_CONTROLLERS = "rule-based,mh-qp-paper,mh-qp"
+
+
+def compare(
+    cycles: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="CYCLE...",
+            help="Shipped cycles (see [b]qpmpc cycles[/b]) or CSV files.",
+            show_default=False,
+        ),
+    ],
+    controllers: Annotated[
+        str,
+        typer.Option(metavar="NAME,NAME,...", help="Such as dp; a wrong one lists all."),
+    ] = DEFAULT_CONTROLLERS,
+    vehicle: VehicleOption = "prius-nimh",
+    set_: SetOption = None,
+    json_file: JsonOption = None,
+    out: OutOption = None,
+) -> None:
+    """Compare controllers on cycles: fuel, savings, limits, time a step.
+
+    With --out: a picture and trajectories of each cycle, the figures, and an HTML report.
+
+    For example:
+
+      qpmpc compare nycc nedc-truncated --out results
+
+      qpmpc compare nycc --controllers rule-based,mh-qp,dp --json -
+
+      qpmpc compare my_trip.csv --vehicle my_car.toml --set trip.soc_init=0.55
+    """
+    from qpmpc.cli.console import progress_bar, result_console, write_json
+    from qpmpc.cli.inputs import check_outputs, load_vehicle_and_settings
+    from qpmpc.cli.table import print_rows
+    from qpmpc.comparison import compare_runs
+    from qpmpc.cycles import load_cycle
+    from qpmpc.errors import InputError
+    from qpmpc.report.columns import COMPARE_GROUPS, notes
+    from qpmpc.report.write import write_comparison
+    from qpmpc.runners import check_names, run
+
+    names = [name.strip() for name in controllers.split(",")]
+    check_names(names)
+    car, settings = load_vehicle_and_settings(vehicle, set_)
+    trips = [load_cycle(cycle) for cycle in cycles]
+    for i, trip in enumerate(trips):
+        if trip.name in [other.name for other in trips[:i]]:
+            raise InputError(f"cycle {trip.name!r} is named twice")
+    check_outputs(json_file, out)
+    runs = []
+    with progress_bar(len(trips) * len(names)) as bar:
+        for trip in trips:  # one after the other, so that step times are not disturbed
+            for name in names:
+                report = bar.next_job(f"{trip.name}, {name}")
+                runs.append(run(trip, name, car, settings, report))
+    rows = compare_runs(runs)
+    write_json({"runs": rows}, json_file)
+    remarks = notes(rows)
+    if out is not None:
+        remarks += write_comparison(runs, rows, settings, out)
+    console = result_console(json_file)
+    print_rows(console, rows, COMPARE_GROUPS, "cycle")
+    for remark in remarks:
+        console.print(remark, markup=False)

@@ -1,0 +1,39 @@
+"""What commands do before any time is spent: load, apply overrides, check where results go."""
+
+from pathlib import Path
+
+from qpmpc.controllers.factory import ControllerSettings, split_settings
+from qpmpc.files import check_file, check_folder
+from qpmpc.settings import parse_settings
+from qpmpc.vehicle import Vehicle, load_vehicle
+
+STDOUT = Path("-")
+
+
+def load_vehicle_and_settings(
+    name_or_file: str, overrides: list[str] | None
+) -> tuple[Vehicle, ControllerSettings]:
+    """Load a vehicle and apply ``--set KEY=VALUE`` to it and to the controllers' settings.
+
+    Raises
+    ------
+    InputError
+        If the vehicle cannot be loaded, or a key or value is not allowed.
+    """
+    of_vehicle, of_controllers = split_settings(parse_settings(overrides or []))
+    vehicle = load_vehicle(name_or_file).with_settings(of_vehicle)
+    return vehicle, ControllerSettings().with_settings(of_controllers)
+
+
+def check_outputs(json_file: Path | None, out: Path | None) -> None:
+    """Check that results can be written.
+
+    Raises
+    ------
+    InputError
+        See `qpmpc.files`.
+    """
+    if json_file is not None and json_file != STDOUT:
+        check_file(json_file, "--json")
+    if out is not None:
+        check_folder(out, "--out")

@@ -1,0 +1,47 @@
+"""Arguments and options that commands share."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+CycleArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="CYCLE",
+        help="A shipped cycle (see [b]qpmpc cycles[/b]) or a CSV file "
+        "with time_s,speed_mps[dim],grade[/dim].",
+        show_default=False,
+    ),
+]
+VehicleOption = Annotated[
+    str,
+    typer.Option(
+        "--vehicle",
+        metavar="NAME|FILE.toml",
+        help="A shipped vehicle (see [b]qpmpc vehicles[/b]) or a TOML file with the same keys.",
+    ),
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Change a parameter of the vehicle or of a controller by its dotted name; repeatable. "
+        "A wrong name lists the right ones.",
+        show_default=False,
+    ),
+]
+JsonOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--json",
+        metavar="FILE",
+        help="Write the figures as JSON; - is standard output, the table then goes to stderr.",
+        show_default=False,
+    ),
+]
+OutOption = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Write files into this folder.", show_default=False),
+]

@@ -1,0 +1,56 @@
+"""``qpmpc simulate``: one cycle, one controller."""
+
+from typing import Annotated
+
+import typer
+
+from qpmpc.cli.options import CycleArgument, JsonOption, OutOption, SetOption, VehicleOption
+
+
+def simulate(
+    cycle: CycleArgument,
+    controller: Annotated[
+        str,
+        typer.Option(metavar="NAME", help="Such as mh-qp, rule-based, dp; a wrong one lists all."),
+    ] = "mh-qp",
+    vehicle: VehicleOption = "prius-nimh",
+    set_: SetOption = None,
+    json_file: JsonOption = None,
+    out: OutOption = None,
+) -> None:
+    """Drive one cycle with one controller on the nonlinear plant.
+
+    With --out: trajectory (CSV), figures (JSON) and picture (PNG) of the run.
+
+    For example:
+
+      qpmpc simulate nycc
+
+      qpmpc simulate my_trip.csv --vehicle prius-liion --out results
+
+      qpmpc simulate udds --set thermal.t_amb_degc=-15 --set mh_qp.osqp.iterations=25 --json -
+    """
+    from qpmpc.cli.console import progress_bar, result_console, write_json
+    from qpmpc.cli.inputs import check_outputs, load_vehicle_and_settings
+    from qpmpc.cli.table import print_rows
+    from qpmpc.cycles import load_cycle
+    from qpmpc.report.columns import SIMULATE_GROUPS, notes
+    from qpmpc.report.write import write_run
+    from qpmpc.runners import check_names, run
+
+    check_names([controller])
+    car, settings = load_vehicle_and_settings(vehicle, set_)
+    trip = load_cycle(cycle)
+    check_outputs(json_file, out)
+    with progress_bar(1) as bar:
+        report = bar.next_job(f"{trip.name}, {controller}")
+        finished = run(trip, controller, car, settings, report)
+    summary = finished.summary()
+    write_json(summary, json_file)
+    remarks = notes([summary])
+    if out is not None:
+        remarks += write_run(finished, out)
+    console = result_console(json_file)
+    print_rows(console, [summary], SIMULATE_GROUPS, "cycle")
+    for remark in remarks:
+        console.print(remark, markup=False)

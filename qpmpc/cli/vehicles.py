@@ -1,0 +1,100 @@
+"""``qpmpc vehicles``: parameters with their units, and the piecewise-affine models made of them."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from qpmpc.cli.options import OutOption
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from qpmpc.report.pwa_curves import PwaCurve
+    from qpmpc.vehicle import Vehicle
+
+
+def vehicles(
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="NAME|FILE.toml", help="Show the parameters of this one.", show_default=False
+        ),
+    ] = None,
+    out: OutOption = None,
+) -> None:
+    """List the shipped vehicles, or show the parameters of one and its piecewise-affine models.
+
+    With --out: a picture of the piecewise-affine fits and their errors.
+
+    For example:
+
+      qpmpc vehicles
+
+      qpmpc vehicles prius-nimh --out results
+    """
+    from qpmpc.cli.console import result_console
+    from qpmpc.cli.inputs import check_outputs
+    from qpmpc.errors import InputError
+    from qpmpc.report.pwa_curves import pwa_curves
+    from qpmpc.report.write import write_pwa
+    from qpmpc.vehicle import load_vehicle, vehicle_names
+
+    if name is None and out is not None:
+        raise InputError(
+            "--out draws one vehicle: name it, e.g. qpmpc vehicles prius-nimh --out results"
+        )
+    check_outputs(None, out)
+    console = result_console()
+    if name is None:
+        for shipped in vehicle_names():
+            console.print(f"{shipped}: {load_vehicle(shipped).description}", markup=False)
+        return
+    vehicle = load_vehicle(name)
+    curves = pwa_curves(vehicle)
+    console.print(f"{vehicle.name}: {vehicle.description}", markup=False)
+    console.print(_parameters(vehicle))
+    console.print("Piecewise-affine models of the controllers, with proven error bounds")
+    console.print(_pwa(curves))
+    if out is not None:
+        for remark in write_pwa(vehicle, curves, out):
+            console.print(remark, markup=False)
+
+
+def _parameters(vehicle: "Vehicle") -> "Table":
+    from rich import box
+    from rich.table import Table
+
+    from qpmpc.report.units import unit_of
+
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
+    table.add_column("parameter", no_wrap=True)
+    table.add_column("value", overflow="fold")
+    table.add_column("unit", no_wrap=True)
+    for section, values in vehicle.model_dump(exclude={"name", "description"}).items():
+        for key, value in values.items():
+            items = value if isinstance(value, tuple) else (value,)
+            text = " ".join(f"{item:.10g}" for item in items)
+            table.add_row(f"{section}.{key}", text, unit_of(key))
+        table.add_section()
+    return table
+
+
+def _pwa(curves: "list[PwaCurve]") -> "Table":
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
+    table.add_column("curve", overflow="fold")
+    table.add_column("pieces", justify="right")
+    table.add_column("breakpoints", overflow="fold")
+    table.add_column("at most below", justify="right", no_wrap=True)
+    table.add_column("at most above", justify="right", no_wrap=True)
+    for curve in curves:
+        table.add_row(
+            f"{curve.title}: {curve.x_label} -> {curve.y_label}",
+            str(curve.fit.pieces),
+            " ".join(f"{x / curve.x_unit:.5g}" for x in curve.fit.breakpoints),
+            f"{curve.fit.below / curve.y_unit:.3g} {curve.y_unit_name}",
+            f"{curve.fit.above / curve.y_unit:.3g} {curve.y_unit_name}",
+        )
+    return table

@@ -1,0 +1,105 @@
+"""Columns of the tables of runs, the same in the terminal and in the report."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+Row = dict[str, Any]
+
+NOT_COMPARABLE = "*"
+NONE = "-"
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: its title, with the unit, and how the JSON of a run becomes a cell."""
+
+    title: str
+    text: Callable[[Row], str]
+    is_name: bool = False
+
+
+def _number(value: float | None, digits: int) -> str:
+    if value is None:
+        return NONE
+    text = f"{value:.{digits}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def _marked(row: Row, key: str, digits: int) -> str:
+    """Number with the mark of runs that are not comparable, when there is a number."""
+    text = _number(row[key], digits)
+    return text if row["comparable"] or row[key] is None else text + NOT_COMPARABLE
+
+
+def _range(low: float, high: float, digits: int) -> str:
+    return f"{low:.{digits}f}..{high:.{digits}f}"
+
+
+def violations_text(row: Row) -> str:
+    """Largest excess over each limit that was violated."""
+    found = row["violations"]
+    parts = [
+        (found["soc"], f"SOC {found['soc']:.2g}"),
+        (found["t_cl_degc"], f"T_cl {found['t_cl_degc']:.2g} K"),
+        (found["power_w"], f"{found['power_w']:.2g} W"),
+    ]
+    return ", ".join(text for excess, text in parts if excess > 0.0) or "none"
+
+
+def _times(row: Row) -> str:
+    times = row["step_time_ms"]
+    if times["median"] is None:
+        return NONE
+    return " / ".join(f"{times[key]:.3g}" for key in ("median", "p99", "max"))
+
+
+def _share(row: Row) -> str:
+    share = row["sigma_integral_share"]
+    return NONE if share is None else f"{100.0 * share:.1f}"
+
+
+NAME = (
+    Column("cycle", lambda row: row["cycle"], is_name=True),
+    Column("controller", lambda row: row["controller"], is_name=True),
+)
+FUEL = (
+    Column("fuel g", lambda row: _number(row["fuel_g"], 1)),
+    Column("balanced g", lambda row: _marked(row, "fuel_soc_balanced_g", 1)),
+)
+AGAINST = (
+    Column("saving %", lambda row: _marked(row, "saving_vs_rule_percent", 2)),
+    Column("above DP %", lambda row: _marked(row, "fuel_above_dp_percent", 2)),
+)
+STATE = (
+    Column("SOC", lambda row: _range(row["soc_min"], row["soc_max"], 3)),
+    Column("T_cl °C", lambda row: _range(row["t_cl_min_degc"], row["t_cl_max_degc"], 1)),
+)
+OPERATION = (
+    Column("starts", lambda row: str(row["engine_starts"])),
+    Column("violations", violations_text),
+    Column("fallback s", lambda row: str(row["fallback_steps"])),
+    Column("integral %", _share),
+    Column("step ms med / p99 / max", _times),
+)
+
+SIMULATE_GROUPS = (NAME, (*FUEL, *STATE), OPERATION)
+COMPARE_GROUPS = (NAME, (*FUEL, *AGAINST, *STATE), OPERATION)
+
+
+def filled(columns: Sequence[Column], rows: Sequence[Row]) -> list[Column]:
+    """Return the columns that have a figure in any of the rows."""
+    return [column for column in columns if any(column.text(row) != NONE for row in rows)]
+
+
+def notes(rows: Sequence[Row]) -> list[str]:
+    """Sentences that explain the marks in a table of these rows."""
+    found = []
+    if not all(row["comparable"] for row in rows):
+        found.append(
+            f"{NOT_COMPARABLE} not comparable: the run ends so far from its initial SOC that the "
+            "correction exceeds 3 % of its fuel"
+        )
+    if any(not r["comparable"] and r["controller"] in ("rule-based", "dp") for r in rows):
+        found.append("  percentages against such a run are no more certain than the run itself")
+    return found

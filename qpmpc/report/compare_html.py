@@ -1,0 +1,105 @@
+"""The HTML report of a comparison: one file that needs nothing else."""
+
+import json
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from typing import Any
+
+from jinja2 import Environment, StrictUndefined
+
+from qpmpc.comparison import OPTIMUM, REFERENCE
+from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.report.columns import COMPARE_GROUPS, Row, filled, notes
+from qpmpc.report.provenance import provenance
+from qpmpc.report.units import unit_of
+from qpmpc.results import INTEGRAL, Run
+
+
+def compare_html(
+    runs: Sequence[Run],
+    rows: Sequence[Row],
+    settings: ControllerSettings,
+    pictures: Mapping[str, bytes],
+) -> str:
+    """Return the report.
+
+    Parameters
+    ----------
+    runs : all with one vehicle
+    rows : the same runs, as `compare_runs` returns them
+    settings : with which they were made
+    pictures : PNG of each cycle
+    """
+    vehicle = runs[0].vehicle
+    columns = filled([column for group in COMPARE_GROUPS for column in group], rows)
+    names = {run.controller.replace("-", "_") for run in runs}
+    template = files("qpmpc.report").joinpath("compare.html.j2").read_text("utf-8")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    return environment.from_string(template).render(
+        vehicle=vehicle,
+        columns=columns,
+        rows=rows,
+        marks=notes(rows),
+        remarks=_remarks(rows, settings),
+        relaxed=[row for row in rows if row["sigma_integral_share"] is not None],
+        integral_percent=100.0 * INTEGRAL,
+        pictures={cycle: b64encode(data).decode() for cycle, data in pictures.items()},
+        parameters=[
+            (f"{section}.{key}", _text(value), unit_of(key))
+            for section, values in vehicle.model_dump(exclude={"name", "description"}).items()
+            for key, value in values.items()
+        ],
+        settings=json.dumps(settings.model_dump(include=names), indent=2),
+        provenance=provenance(),
+    )
+
+
+def _text(value: Any) -> str:
+    items = value if isinstance(value, tuple) else (value,)
+    return " ".join(f"{item:.10g}" for item in items)
+
+
+def _remarks(rows: Sequence[Row], settings: ControllerSettings) -> list[str]:
+    """What a reader must know before believing the table."""
+    present = {row["controller"] for row in rows}
+    remarks = [
+        "Balanced fuel is the fuel burnt plus that which the difference between initial and final "
+        "SOC is worth at the efficiency trip.eta_eq. Savings and distances compare balanced fuel.",
+        "Controllers with a preview are given the true trip, in the short and in the long horizon: "
+        "no forecast error.",
+        "Step times are wall times of one decision in this Python process, all runs one after the "
+        "other. The longest of a QP controller is its first: it solves from cold at departure.",
+    ]
+    if REFERENCE in present:
+        remarks.append(
+            "The saving depends on the thresholds of the rules more than on any parameter of the "
+            "car: read the distance from dynamic programming as well, where there is one."
+        )
+        if settings.rule_based.balance:
+            remarks.append(
+                "The SOC reference of the rules was chosen for each trip, knowing it, so that the "
+                "trip ends as nearly as possible at its initial SOC."
+            )
+    if OPTIMUM in present:
+        remarks.append(
+            "dp is dynamic programming: it knows the whole trip and the plant itself, is no "
+            "controller that could run in a car, and has no time a step."
+        )
+        worst = min((row["fuel_above_dp_percent"] for row in rows), default=0.0)
+        if worst < 0.0:
+            remarks.append(
+                f"A run is {-worst:.2f} % below dp. The SOC of that run ends elsewhere, which its "
+                "correction prices only approximately, or the grid of dp is too coarse."
+            )
+    violated = [row for row in rows if any(row["violations"].values())]
+    names = ", ".join(f"{row['controller']} on {row['cycle']}" for row in violated)
+    remarks.append(f"Limits were violated by: {names}." if names else "No limit was violated.")
+    fallbacks = [row for row in rows if row["fallback_steps"]]
+    if fallbacks:
+        names = ", ".join(
+            f"{row['controller']} on {row['cycle']} ({row['fallback_steps']} s)"
+            for row in fallbacks
+        )
+        remarks.append(f"A fallback drove in place of the optimiser: {names}.")
+    return remarks

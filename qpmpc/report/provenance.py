@@ -1,0 +1,41 @@
+"""What made a result: versions, machine, time."""
+
+import os
+import platform
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import qpmpc
+
+PACKAGES = ("numpy", "scipy", "osqp")
+
+
+def provenance() -> dict[str, str]:
+    """Return what a reader needs in order to repeat the result or to judge its step times."""
+    packages = {name: _version(name) for name in PACKAGES}
+    return {
+        "qpmpc-iptm": qpmpc.__version__,
+        "Python": platform.python_version(),
+        **packages,
+        "processor": f"{_processor()}, {os.cpu_count()} logical cores",
+        "system": f"{platform.system()} {platform.machine()}",
+        "made": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+    }
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _processor() -> str:
+    """Model of the processor; Linux tells it in a file, others through `platform`."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
+    except OSError:
+        lines = []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return models[0] if models else platform.processor() or "unknown"

@@ -1,0 +1,51 @@
+"""How pictures look: colours that colour-blind readers can tell apart, one set-up for all."""
+
+from io import BytesIO
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+# Okabe and Ito, "Color Universal Design" (2008): safe with all common colour deficiencies.
+BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+BLUE, VERMILION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
+GREY = "#777777"
+
+# A controller has the same colour and dashes in every picture; others take the spare ones.
+CONTROLLER_STYLES = {
+    "mh-qp": (VERMILION, "-"),
+    "mh-qp-paper": (SKY, "-"),
+    "rule-based": (GREY, "-"),
+    "dp": (BLACK, (0, (4, 2))),
+    "baseline-mpc": (GREEN, "-"),
+    "ecms": (ORANGE, "-"),
+    "mh-nlp": (PURPLE, (0, (4, 2))),
+}
+SPARE_STYLES = ((BLUE, "-"), (BLUE, (0, (1, 1))))
+LIMIT: dict[str, Any] = {"color": "#AA0000", "linewidth": 0.8, "linestyle": (0, (1, 2))}
+
+DPI = 110
+
+
+def line_style(controller: str, index: int = 0) -> dict[str, Any]:
+    """Return matplotlib's keywords for the line of a controller."""
+    spare = SPARE_STYLES[index % len(SPARE_STYLES)]
+    color, dashes = CONTROLLER_STYLES.get(controller, spare)
+    return {"color": color, "linestyle": dashes, "linewidth": 1.2}
+
+
+def tidy(axes: Axes) -> None:
+    """Take off what carries no information."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(color="#dddddd", linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.tick_params(labelsize=8)
+    axes.yaxis.label.set_fontsize(8.5)
+    axes.xaxis.label.set_fontsize(8.5)
+
+
+def png(figure: Figure) -> bytes:
+    """Render as PNG, without the date, so that equal results make equal files."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
+    return buffer.getvalue()

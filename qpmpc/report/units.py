@@ -1,0 +1,32 @@
+"""Units of parameters, as the ends of their names say."""
+
+_UNITS = {
+    "n_per_mps2": "N/(m/s)²",
+    "n_per_mps": "N/(m/s)",
+    "w_per_k_per_mps": "W/(K m/s)",
+    "w_per_k": "W/K",
+    "j_per_kg": "J/kg",
+    "j_per_k": "J/K",
+    "kg_per_l": "kg/L",
+    "kj_per_rev_l": "kJ/(rev L)",
+    "rpm": "1/min",
+    "nm": "N m",
+    "ohm": "Ω",
+    "degc": "°C",
+    "ah": "A h",
+    "kg": "kg",
+    "g": "g",
+    "k": "K",
+    "l": "L",
+    "n": "N",
+    "v": "V",
+    "w": "W",
+}
+
+
+def unit_of(name: str) -> str:
+    """Return the unit at the end of a parameter's name; empty if it has none."""
+    for suffix, unit in _UNITS.items():
+        if name.endswith(f"_{suffix}"):
+            return unit
+    return ""

@@ -1,0 +1,101 @@
+"""Files of a result: CSV, JSON, pictures, the HTML report."""
+
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.cycles import Cycle
+from qpmpc.files import json_text, write_bytes, write_text
+from qpmpc.report.pwa_curves import PwaCurve
+from qpmpc.report.trajectory_csv import trajectory_csv
+from qpmpc.results import Run
+from qpmpc.vehicle.parameters import Vehicle
+
+PLOT_EXTRA = "pip install 'qpmpc-iptm[plot]'"
+
+
+def write_run(run: Run, folder: Path) -> list[str]:
+    """Write trajectory, figures and picture of one run; returns remarks for the user."""
+    stem = f"{run.cycle}_{run.controller}"
+    write_text(folder / f"{stem}.csv", trajectory_csv(run))
+    write_text(folder / f"{stem}.json", json_text(run.summary()))
+
+    def draw() -> bytes:
+        from qpmpc.report.trajectories import draw_trajectories
+
+        return draw_trajectories([run])
+
+    drawn = _write_picture(folder / f"{stem}.png", draw)
+    return [f"{folder / stem}.csv, .json{', .png' if not drawn else ''} written", *drawn]
+
+
+def write_comparison(
+    runs: Sequence[Run],
+    rows: Sequence[dict[str, Any]],
+    settings: ControllerSettings,
+    folder: Path,
+) -> list[str]:
+    """Write trajectories, figures, a picture a cycle and the report; returns remarks.
+
+    Parameters
+    ----------
+    runs : all with one vehicle
+    rows : the same runs, as `compare_runs` returns them
+    settings : with which they were made
+    """
+    for run in runs:
+        write_text(folder / f"{run.cycle}_{run.controller}.csv", trajectory_csv(run))
+    write_text(folder / "compare.json", json_text({"runs": list(rows)}))
+    missing = _missing("matplotlib", "jinja2")
+    if missing:
+        return [
+            f"{folder}: trajectories (CSV) and compare.json written; no pictures and no report: "
+            f"{missing} is not installed ({PLOT_EXTRA})"
+        ]
+    from qpmpc.report.compare_html import compare_html
+    from qpmpc.report.trajectories import draw_trajectories
+
+    pictures = {}
+    for cycle in dict.fromkeys(run.cycle for run in runs):
+        pictures[cycle] = draw_trajectories([run for run in runs if run.cycle == cycle])
+        write_bytes(folder / f"{cycle}.png", pictures[cycle])
+    write_text(folder / "compare.html", compare_html(runs, rows, settings, pictures))
+    return [f"{folder / 'compare.html'} written, with pictures, trajectories and compare.json"]
+
+
+def write_cycle(cycle: Cycle, folder: Path) -> list[str]:
+    """Draw a cycle; returns remarks."""
+
+    def draw() -> bytes:
+        from qpmpc.report.cycle_picture import draw_cycle
+
+        return draw_cycle(cycle)
+
+    file = folder / f"cycle_{cycle.name}.png"
+    return _write_picture(file, draw) or [f"{file} written"]
+
+
+def write_pwa(vehicle: Vehicle, curves: Sequence[PwaCurve], folder: Path) -> list[str]:
+    """Draw the piecewise-affine fits of a vehicle; returns remarks."""
+
+    def draw() -> bytes:
+        from qpmpc.report.pwa_picture import draw_pwa
+
+        return draw_pwa(vehicle.name, curves)
+
+    file = folder / f"pwa_{vehicle.name}.png"
+    return _write_picture(file, draw) or [f"{file} written"]
+
+
+def _write_picture(file: Path, draw: Callable[[], bytes]) -> list[str]:
+    missing = _missing("matplotlib")
+    if missing:
+        return [f"{file} not drawn: {missing} is not installed ({PLOT_EXTRA})"]
+    write_bytes(file, draw())
+    return []
+
+
+def _missing(*modules: str) -> str:
+    return next((module for module in modules if find_spec(module) is None), "")
