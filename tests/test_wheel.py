@@ -1,5 +1,6 @@
 """The wheel, installed away from the checkout, does what the checkout does."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -115,3 +116,17 @@ def test_installed_package_has_the_cycles(scripts: Path, tmp_path: Path) -> None
     listed = dict(line.split() for line in output.splitlines())
     assert listed["nycc"] == "598"
     assert listed["nedc-truncated"] == "790"
+
+
+def test_main_job_from_the_wheel(scripts: Path, tmp_path: Path) -> None:
+    report, out = tmp_path / "runs.json", tmp_path / "out"
+    command = ("compare", "nycc", "--controllers", "rule-based,mh-qp")
+    table = run(scripts / "qpmpc", *command, "--json", report, "--out", out, cwd=tmp_path)
+    assert "mh-qp" in table
+    runs = {run["controller"]: run for run in json.loads(report.read_text())["runs"]}
+    assert runs.keys() == {"rule-based", "mh-qp"}
+    # the goal of the project on this cycle; the wheel must not lose any of it
+    assert runs["mh-qp"]["saving_vs_rule_percent"] > 20
+    assert all(excess == 0 for excess in runs["mh-qp"]["violations"].values())
+    assert (out / "nycc.png").read_bytes().startswith(b"\x89PNG")
+    assert {path.name for path in tmp_path.iterdir()} == {"runs.json", "out"}
