@@ -44,7 +44,8 @@ def key(cycle: Cycle, vehicle: Vehicle, settings: DpSettings) -> str:
 def load(name: str) -> DpSolution | None:
     """Return the result of that key; None if there is none or it cannot be read."""
     try:
-        with np.load(_path(name), allow_pickle=False) as data:
+        # numpy leaves a file open that it opened itself and cannot read
+        with _path(name).open("rb") as file, np.load(file, allow_pickle=False) as data:
             text = json.loads(str(data["text"]))
             arrays = {field: data[field] for field in data.files if field != "text"}
         levels = tuple(DpLevel(*level) for level in text.pop("levels"))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from qpmpc.verification.dynamic_programming.kernels import Floats, Lattice
 from qpmpc.verification.dynamic_programming.problem import Problem
+from qpmpc.verification.dynamic_programming.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
@@ -69,10 +70,19 @@ class Axis:
 
 @dataclass(frozen=True)
 class Grid:
-    """SOC and coolant axes, and the spacing of the engine power."""
+    """SOC and coolant axes, slopes of the value beyond them, spacing of the engine power.
+
+    Attributes
+    ----------
+    soc, t_cl : axes
+    soc_price_g, t_cl_price_g_per_k : fuel saved by a unit more, at the times 0..n, shape (n+1,)
+    power_step_w : spacing of the engine power
+    """
 
     soc: Axis
     t_cl: Axis
+    soc_price_g: Floats
+    t_cl_price_g_per_k: Floats
     power_step_w: float
 
     @classmethod
@@ -84,6 +94,8 @@ class Grid:
         return cls(
             Axis.full(maps.soc_min, maps.soc_max, soc_step, times),
             Axis.full(maps.t_cl_min_degc, maps.t_cl_max_degc, t_cl_step_k, times),
+            np.zeros(times),
+            np.zeros(times),
             power_step_w,
         )
 
@@ -91,8 +103,7 @@ class Grid:
     def around(
         cls,
         problem: Problem,
-        soc: Floats,
-        t_cl_degc: Floats,
+        path: Trajectory,
         half_width: tuple[float, float],
         step: tuple[float, float],
         power_step_w: float,
@@ -100,8 +111,12 @@ class Grid:
         """Cover a tube around a path."""
         maps = problem.maps
         return cls(
-            Axis.around(soc, half_width[0], maps.soc_min, maps.soc_max, step[0]),
-            Axis.around(t_cl_degc, half_width[1], maps.t_cl_min_degc, maps.t_cl_max_degc, step[1]),
+            Axis.around(path.soc, half_width[0], maps.soc_min, maps.soc_max, step[0]),
+            Axis.around(
+                path.t_cl_degc, half_width[1], maps.t_cl_min_degc, maps.t_cl_max_degc, step[1]
+            ),
+            np.append(path.soc_costate_g, 0.0),
+            np.append(path.t_cl_costate_g_per_k, 0.0),
             power_step_w,
         )
 
@@ -110,9 +125,21 @@ class Grid:
         """Points in SOC and T at one time."""
         return self.soc.points, self.t_cl.points
 
+    @property
+    def nodes(self) -> int:
+        """Points of the state at one time."""
+        return self.soc.points * self.t_cl.points
+
     def lattice(self, k: int) -> Lattice:
-        """Corner and cell size at time k."""
-        return Lattice(self.soc.origin(k), self.soc.spacing, self.t_cl.origin(k), self.t_cl.spacing)
+        """Place, cells and outer slopes at time k."""
+        return Lattice(
+            self.soc.origin(k),
+            self.soc.spacing,
+            self.t_cl.origin(k),
+            self.t_cl.spacing,
+            float(self.soc_price_g[k]),
+            float(self.t_cl_price_g_per_k[k]),
+        )
 
     def power_count(self, problem: Problem, k: int) -> int:
         """Number of engine powers tried in step k, both ends of the range included."""

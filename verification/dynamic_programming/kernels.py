@@ -18,7 +18,6 @@ Cells = NDArray[np.uint32]
 
 INF = np.inf
 ONE = np.uint32(1)
-EDGE = 1e-9  # tolerance at the edge of a grid, in cells
 MARGIN = 1e-9  # kept from the limits, so that rounding cannot cross them
 ROUNDING = 1e-14  # at SOC_max, where the brakes hold the battery exactly
 BISECTIONS = 60
@@ -65,12 +64,18 @@ class Maps(NamedTuple):
 
 
 class Lattice(NamedTuple):
-    """Where a grid lies: node (i, j) is at origin + (i, j) * spacing."""
+    """Where a grid lies: node (i, j) is at origin + (i, j) * spacing.
+
+    Beyond its edges the value function continues with the slopes -soc_price_g per unit of SOC and
+    -t_cl_price_g_per_k.
+    """
 
     soc_origin: float
     soc_spacing: float
     t_cl_origin: float
     t_cl_spacing: float
+    soc_price_g: float
+    t_cl_price_g_per_k: float
 
 
 class Step(NamedTuple):
@@ -235,7 +240,8 @@ def coasting_set(
     """
     n = len(demand_w)
     soc, t_cl = np.full(n + 1, INF), np.full(n + 1, INF)
-    soc[n], t_cl[n] = soc_end + MARGIN, maps.t_cl_min_degc + MARGIN
+    soc[n] = min(soc_end + MARGIN, maps.soc_max - MARGIN)
+    t_cl[n] = maps.t_cl_min_degc + MARGIN
     for k in range(n - 1, -1, -1):
         p, v = demand_w[k], speed_mps[k]
         charged = off_step_inverse(maps, p, v, False, maps.soc_min, maps.soc_max, soc[k + 1])
@@ -298,9 +304,9 @@ def cell(position: float, points: int) -> tuple[int, float]:
 
 
 @compiled
-def outside(position: float, points: int) -> bool:
-    """Tell whether a position lies off an axis."""
-    return position < -EDGE or position > points - 1.0 + EDGE
+def beyond(position: float, points: int) -> float:
+    """Distance by which a position exceeds an axis, negative below it, in cells."""
+    return position - min(max(position, 0.0), points - 1.0)
 
 
 @compiled
@@ -323,7 +329,30 @@ def gradient(value: Floats, row: float, column: float) -> tuple[float, float]:
     return rise / (high - low), run / (right - left)
 
 
+@compiled
+def extended(value: Floats, target: Lattice, soc: float, t_cl: float) -> float:
+    """Value at any state: interpolated on the grid, linear beyond it."""
+    row = (soc - target.soc_origin) / target.soc_spacing
+    column = (t_cl - target.t_cl_origin) / target.t_cl_spacing
+    soc_excess = beyond(row, value.shape[0]) * target.soc_spacing
+    t_excess = beyond(column, value.shape[1]) * target.t_cl_spacing
+    outer = target.soc_price_g * soc_excess + target.t_cl_price_g_per_k * t_excess
+    return interpolate(value, row, column) - outer
+
+
 # the Bellman step
+
+
+@compiled
+def soc_allowed(maps: Maps, soc: float) -> bool:
+    """Tell whether SOC is within its limits."""
+    return maps.soc_min + MARGIN <= soc <= maps.soc_max + ROUNDING
+
+
+@compiled
+def t_cl_allowed(maps: Maps, t_cl: float) -> bool:
+    """Tell whether the coolant is within its limits."""
+    return maps.t_cl_min_degc + MARGIN <= t_cl <= maps.t_cl_max_degc - MARGIN
 
 
 @compiled
@@ -347,34 +376,23 @@ def command_cost(
 ) -> float:
     """Fuel of one command plus W_{k+1} where it leads.
 
-    Leaving limits or grid costs infinity if `strict`, else a penalty on the distance.
+    Breaking a limit costs infinity if `strict`, else a penalty on the distance.
     """
     soc, t_cl = state
-    states, rows, columns = following.shape
     fuel = alpha(maps, t_cl) * hot_fuel_g(maps, power) + start_g if on else 0.0
     t_end = next_t_cl(maps, t_cl, fuel, power, losses_w(maps, t_cl, step.speed_mps))
     soc_end = next_soc(maps, soc, step.demand_w, power)
-    row = (soc_end - target.soc_origin) / target.soc_spacing
-    column = (t_end - target.t_cl_origin) / target.t_cl_spacing
-    if strict:
-        if (
-            outside(row, rows)
-            or outside(column, columns)
-            or not maps.soc_min + MARGIN <= soc_end <= maps.soc_max + ROUNDING
-            or not maps.t_cl_min_degc + MARGIN <= t_end <= maps.t_cl_max_degc - MARGIN
-        ):
+    cost = fuel
+    if not (soc_allowed(maps, soc_end) and t_cl_allowed(maps, t_end)):
+        if strict:
             return INF
-        penalty = 0.0
-    else:
-        soc_low = step.coast_soc if step.last else target.soc_origin
-        soc_high = target.soc_origin + (rows - 1) * target.soc_spacing
-        t_high = target.t_cl_origin + (columns - 1) * target.t_cl_spacing
-        penalty = maps.soc_penalty_g * max(soc_low - soc_end, soc_end - soc_high, 0.0)
-        penalty += maps.t_cl_penalty_g_per_k * max(target.t_cl_origin - t_end, t_end - t_high, 0.0)
+        t_excess = max(maps.t_cl_min_degc - t_end, t_end - maps.t_cl_max_degc, 0.0)
+        soc_excess = max(maps.soc_min - soc_end, soc_end - maps.soc_max, 0.0)
+        cost += maps.soc_penalty_g * soc_excess + maps.t_cl_penalty_g_per_k * t_excess
     if step.last:
-        return fuel + penalty
-    after = 1 if on and states == 2 else 0
-    return fuel + penalty + interpolate(following[after], row, column)
+        return cost + maps.soc_penalty_g * max(step.coast_soc - soc_end, 0.0)
+    after = 1 if on and following.shape[0] == 2 else 0
+    return cost + extended(following[after], target, soc_end, t_end)
 
 
 @compiled
@@ -386,7 +404,7 @@ def least_penalised(
     following: Floats,
     target: Lattice,
 ) -> tuple[float, bool, float]:
-    """Return cost, on or off, and power of the command that leaves the grid by the least."""
+    """Return cost, on or off, and power of the command that breaks limits by the least."""
     best, best_on, best_power = INF, False, 0.0
     if step.off_allowed:
         best = command_cost(maps, step, state, start_g, False, 0.0, following, target, False)
@@ -412,9 +430,10 @@ def temperature_tables(
 ) -> None:
     """Fill fuel and next T, as cell and weight, for all engine states e, inputs u, temperatures j.
 
-    Input u = 0 is off, u >= 1 power u - 1 of `grid_power_w`. Shapes (2 or 1, count+1, nt); fuel
-    is infinite where the next T leaves the grid of `columns` nodes. Two engine states exist only
-    with a start cost: e = 0, off before, and e = 1, on before.
+    Input u = 0 is off, u >= 1 power u - 1 of `grid_power_w`. Shapes (2 or 1, count+1, nt). To
+    the fuel is added what the value changes from the edge of the grid to a next T beyond it; it
+    is infinite where the next T breaks a limit. Two engine states exist only with a start cost:
+    e = 0, off before, and e = 1, on before.
     """
     states, nt = fuel.shape[0], len(t_axis)
     factor, losses = np.empty(nt), np.empty(nt)
@@ -430,15 +449,17 @@ def temperature_tables(
                 used = factor[j] * hot + start_g
                 end = next_t_cl(maps, t_axis[j], used, power, losses[j])
                 position = (end - target.t_cl_origin) / target.t_cl_spacing
-                fuel[e, u, j] = INF if outside(position, columns) else used
+                outer = beyond(position, columns) * target.t_cl_spacing
+                used -= target.t_cl_price_g_per_k * outer
+                fuel[e, u, j] = used if t_cl_allowed(maps, end) else INF
                 column[e, u, j], weight[e, u, j] = cell(position, columns)
 
 
 @compiled
-def mix(lower: Floats, upper: Floats, share: float, result: Floats) -> None:
-    """Interpolate between two rows: result = (1 - share) lower + share upper."""
+def mix(lower: Floats, upper: Floats, share: float, outer: float, result: Floats) -> None:
+    """Interpolate between two rows: result = (1 - share) lower + share upper - outer."""
     for j in range(len(result)):
-        result[j] = (1.0 - share) * lower[j] + share * upper[j]
+        result[j] = (1.0 - share) * lower[j] + share * upper[j] - outer
 
 
 @compiled
@@ -471,7 +492,7 @@ def bellman_rows(
                      min_P alpha f(P) + start + W_{k+1}(x'_P, 1),
                      min_P alpha f(P) + start   over x'_P in the coasting set of k+1 }
 
-    over inputs that keep x' on the grid of k+1; where none does, the least penalised one.
+    over inputs that keep x' within the limits; where none does, the least penalised one.
     `following` and `value` are W_{k+1} and W_k, shape (2 or 1, ns, nt).
     """
     states, rows, columns = following.shape
@@ -486,11 +507,12 @@ def bellman_rows(
             after = 1 if u > 0 and states == 2 else 0
             for i in range(begin, end):
                 soc = next_soc(maps, soc_axis[i], step.demand_w, power)
-                position = (soc - target.soc_origin) / target.soc_spacing
-                if outside(position, rows):
+                if not soc_allowed(maps, soc):
                     continue
+                position = (soc - target.soc_origin) / target.soc_spacing
                 lower, share = cell(position, rows)
-                mix(following[after, lower], following[after, lower + 1], share, mixed)
+                outer = target.soc_price_g * beyond(position, rows) * target.soc_spacing
+                mix(following[after, lower], following[after, lower + 1], share, outer, mixed)
                 for e in range(states):
                     improve(value[e, i], fuel[e, u], column[e, u], weight[e, u], mixed)
     for e in range(states):

@@ -11,7 +11,8 @@ from qpmpc.verification.dynamic_programming.grid import Grid
 from qpmpc.verification.dynamic_programming.problem import Problem, build_problem
 from qpmpc.verification.dynamic_programming.settings import DpSettings
 from qpmpc.verification.dynamic_programming.solution import CLEARANCE, DpLevel, DpSolution
-from qpmpc.verification.dynamic_programming.sweep import Sweep, Trajectory
+from qpmpc.verification.dynamic_programming.sweep import Sweep
+from qpmpc.verification.dynamic_programming.trajectory import Trajectory
 
 MOVES = 6
 MOVES_BEFORE_WIDENING = 2
@@ -46,11 +47,13 @@ def solve(
 
     if settings.refinement == 1:
         return _solution(cycle, problem, run(coarse, 0.0, 1.0), levels)
-    done = _share(coarse, _tube(problem, None, width, fine, power))
+    # the tube has at first about this many nodes, and work is in proportion
+    tube_nodes = 4.0 * width[0] * width[1] / (fine[0] * fine[1])
+    done = coarse.nodes / (coarse.nodes + tube_nodes)
     path = run(coarse, 0.0, done)
     for move in range(MOVES):
-        grid = _tube(problem, path, width, fine, power)
-        # a tube that has to move again takes half of what is left of the progress bar
+        grid = Grid.around(problem, path, width, fine, power)
+        # most tubes need not move: leave a fifth of what is left of the bar to those that do
         upto = 1.0 if move == MOVES - 1 else done + 0.8 * (1.0 - done)
         path = run(grid, done, upto)
         done = upto
@@ -60,24 +63,6 @@ def solve(
             width = (width[0] * WIDENING, width[1] * WIDENING)
     progress(1.0)
     return _solution(cycle, problem, path, levels)
-
-
-def _tube(
-    problem: Problem,
-    path: Trajectory | None,
-    width: tuple[float, float],
-    step: tuple[float, float],
-    power_step_w: float,
-) -> Grid:
-    if path is None:
-        flat = np.full(problem.steps + 1, problem.soc_init)
-        return Grid.around(problem, flat, flat, width, step, power_step_w)
-    return Grid.around(problem, path.soc, path.t_cl_degc, width, step, power_step_w)
-
-
-def _share(coarse: Grid, fine: Grid) -> float:
-    a, b = coarse.shape[0] * coarse.shape[1], fine.shape[0] * fine.shape[1]
-    return a / (a + b)
 
 
 def _level(grid: Grid, path: Trajectory) -> DpLevel:

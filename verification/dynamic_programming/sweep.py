@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, sqrt
 
@@ -11,27 +10,13 @@ import numpy as np
 from qpmpc.vehicle import Command, PlantState
 from qpmpc.verification.dynamic_programming import kernels
 from qpmpc.verification.dynamic_programming.grid import Grid
-from qpmpc.verification.dynamic_programming.kernels import Bools, Cells, Floats, Step
+from qpmpc.verification.dynamic_programming.kernels import Cells, Floats, Step
 from qpmpc.verification.dynamic_programming.problem import Problem
+from qpmpc.verification.dynamic_programming.trajectory import Trajectory
 
 Progress = Callable[[float], None]
 
 NODES_WORTH_THREADS = 5_000
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """What the plant does under the policy of one grid; arrays as in `DpSolution`."""
-
-    soc: Floats
-    t_cl_degc: Floats
-    engine_on: Bools
-    p_eng_w: Floats
-    fuel_g: Floats
-    soc_costate_g: Floats
-    t_cl_costate_g_per_k: Floats
-    value_g: float
-    admissible: bool
 
 
 class Sweep:
@@ -47,7 +32,7 @@ class Sweep:
         self.states = 2 if problem.maps.start_fuel_g > 0.0 else 1
         self.segment = max(1, ceil(sqrt(problem.steps)))
         rows = grid.soc.points
-        parts = threads if rows * grid.t_cl.points >= NODES_WORTH_THREADS else 1
+        parts = threads if grid.nodes >= NODES_WORTH_THREADS else 1
         bounds = np.linspace(0, rows, parts + 1).astype(int).tolist()
         self.chunks = list(pairwise(bounds))
         self.coast = kernels.coasting_set(
