@@ -5,8 +5,9 @@ from qpmpc.vehicle.engine import alpha_at
 from qpmpc.vehicle.plant import Command, Plant
 
 SOC_MARGIN = 0.002  # a step of full power moves SOC by less than this
-T_CL_MARGIN_K = 0.15  # a step of engine off cools the coolant by less than this
-T_CL_SOFT_K = 0.5  # engine power is cut back over this distance below the upper limit
+T_CL_MARGIN_K = 0.02  # kept from the upper limit; what a step leads to is known exactly there
+T_CL_COOLING_K = 0.15  # a step of engine off cools the coolant by less than this
+T_CL_NEAR_K = 2.0  # no step warms the coolant by more than this
 
 
 class SafetyLayer:
@@ -57,19 +58,21 @@ class SafetyLayer:
 
     def _too_cold(self, seen: Observation) -> bool:
         """Whether a second with the engine off would reach the lower coolant limit."""
-        return seen.t_cl_degc < self._vehicle.thermal.t_cl_min_degc + T_CL_MARGIN_K
+        return seen.t_cl_degc < self._vehicle.thermal.t_cl_min_degc + T_CL_COOLING_K
 
     def _cooling_limit_w(self, seen: Observation) -> float:
-        """Engine power at which the coolant no longer warms, near its upper limit only."""
+        """Engine power that just warms the coolant to its upper limit within the step."""
         plant, thermal = self._plant, self._vehicle.thermal
-        if seen.t_cl_degc < thermal.t_cl_max_degc - T_CL_SOFT_K:
+        room_k = thermal.t_cl_max_degc - T_CL_MARGIN_K - seen.t_cl_degc
+        if room_k > T_CL_NEAR_K:
             return self._vehicle.engine.power_max_w
         out_w = (
             plant.air_w(seen.t_cl_degc, seen.speed_mps)
             + plant.radiator_w(seen.t_cl_degc)
             + plant.cabin_w(seen.t_cl_degc)
         )
-        return self._power_for_heat_w(out_w, seen.t_cl_degc)
+        storing_w = room_k * thermal.heat_capacity_j_per_k / plant.step_s
+        return self._power_for_heat_w(out_w + storing_w, seen.t_cl_degc)
 
     def _power_for_heat_w(self, heat_w: float, t_cl_degc: float) -> float:
         """Largest engine power whose heat into the coolant is at most `heat_w` (bisection)."""

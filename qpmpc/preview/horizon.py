@@ -23,7 +23,7 @@ class HorizonSettings(BaseModel):
     blocks: Annotated[int, Field(ge=0, le=500)] = 7
     block_s: Annotated[int, Field(ge=1, le=3600)] = 120
     classes: Literal[1, 3] = 3
-    class_hard_w: float = 6000.0
+    class_hard_w: float = 8000.0
     class_braking_w: float = -500.0
 
     def block_length_s(self, trip_steps: int) -> int:

@@ -134,7 +134,7 @@ def fit_convex(
         raise InputError("a PWA fit needs at least three samples with increasing x")
     allowed = np.broadcast_to(np.asarray(tolerance, dtype=float), x_.shape)
     if not np.all(allowed > 0.0):
-        raise InputError(f"a PWA fit needs a positive tolerance (given: {tolerance})")
+        raise InputError(f"a PWA fit needs a positive tolerance (given: {tolerance!r})")
     envelope = convex_envelope(x_, f_)
     pieces = len(_tangent_pieces(x_, envelope, 2.0 * allowed)[0])
     low, high = 0.0, 1.0

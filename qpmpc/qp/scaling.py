@@ -1,7 +1,7 @@
 """Solver units: the one place where SI quantities are scaled for the QP solver."""
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,8 @@ class ScalingSettings(BaseModel):
 
     Attributes
     ----------
-    power_w, fuel_g_per_s, soc, t_cl_k : one solver unit of each quantity
+    power_w, fuel_g_per_s, t_cl_k : one solver unit of each quantity
+    energy_j : one solver unit of SOC, as the energy it stands for
     duration_exponent : a stage's rates are counted in units / h^exponent, so that a long stage's
         variables, which weigh more, are resolved finer; 1 makes them energies, 0 plain rates
     """
@@ -25,9 +26,9 @@ class ScalingSettings(BaseModel):
 
     power_w: Positive = 10e3
     fuel_g_per_s: Positive = 1.0
-    soc: Positive = 0.01
+    energy_j: Positive = 40e3
     t_cl_k: Positive = 1.0
-    duration_exponent: Literal[0.0, 0.5, 1.0] = 0.5
+    duration_exponent: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
 
 
 @dataclass

@@ -18,6 +18,7 @@ Floats = NDArray[np.float64]
 Weight = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 SHORTEST_SCALE_S = 1.0  # a masked stage is scaled as one of 1 s
+T_CL_MAX_MARGIN_K = 0.05  # small: the radiator is fully open only at the limit itself
 ROW_GAP = 1e-2  # K; even a masked coolant row keeps two bounds, so no row turns into an equality
 REACH_MARGIN_SOC = 1e-5
 SIGMA_FORCED = 0.99  # "engine must be on" as a lower bound on sigma, kept apart from the upper one
@@ -30,7 +31,7 @@ class QpSettings(BaseModel):
     ----------
     terminal_low, terminal_high : terminal SOC band as multiples of the initial SOC (paper eq. 11)
     soc_penalty_g : lambda of a quadratic terminal cost, g per (unit SOC)^2, instead of the band
-    t_cl_margin_k : the coolant is planned to stay this far inside its limits
+    t_cl_margin_k : the coolant is planned to stay this far above its lower limit
     slack_g_per_k : price of a coolant limit exceeded, g per K and stage
     regularisation : quadratic cost on rates and slack in solver units, far below any fuel
     """
@@ -109,7 +110,8 @@ class StageQp:
         self._hessian = np.full((stages, VARS), settings.regularisation)
         self._hessian[:, [Var.SOC, Var.T_CL]] = 0.0
         self._unit = np.empty(VARS)
-        self._unit[[Var.SOC, Var.T_CL, Var.T_SLACK]] = scaling.soc, scaling.t_cl_k, scaling.t_cl_k
+        self._unit[Var.SOC] = scaling.energy_j / model.battery_energy_j
+        self._unit[[Var.T_CL, Var.T_SLACK]] = scaling.t_cl_k
         self._unit[[Var.P_ENG, Var.INTERNAL]] = scaling.power_w
         self._unit[[Var.ON, Var.FUEL]] = 1.0, scaling.fuel_g_per_s
         self._is_rate = np.isin(np.arange(VARS), [Var.P_ENG, Var.ON, Var.FUEL, Var.INTERNAL])
@@ -166,7 +168,7 @@ class StageQp:
                 self._terminal(self.settings.terminal_high), battery.soc_max
             )
         lower[:, rows.t_cl_min] = thermal.t_cl_min_degc + self.settings.t_cl_margin_k
-        upper[:, rows.t_cl_max] = thermal.t_cl_max_degc - self.settings.t_cl_margin_k
+        upper[:, rows.t_cl_max] = thermal.t_cl_max_degc - T_CL_MAX_MARGIN_K
         lower[:, rows.box_slack] = 0.0
         return lower, upper
 

@@ -36,6 +36,10 @@ class Rows:
     battery_pieces: int
 
     @property
+    def _boxes(self) -> int:
+        return 2 + self.fuel_pieces + self.battery_pieces
+
+    @property
     def soc(self) -> int:
         """SOC_k - SOC_{k-1} + h G / E_bat = 0."""
         return 0
@@ -53,47 +57,48 @@ class Rows:
     @property
     def battery(self) -> slice:
         """G + c_j E - (c_j P0 + d_j - l(P0)) sigma >= l(P0)."""
-        return slice(self.fuel.stop, self.fuel.stop + self.battery_pieces)
+        first = 2 + self.fuel_pieces
+        return slice(first, first + self.battery_pieces)
 
     @property
     def p_eng_max(self) -> int:
         """E - min(P_max, P0 + P_chg) sigma <= 0."""
-        return self.battery.stop
+        return self._boxes
 
     @property
     def p_eng_min(self) -> int:
         """E - P_min sigma >= what the battery cannot give."""
-        return self.battery.stop + 1
+        return self._boxes + 1
 
     @property
     def box_soc(self) -> int:
         """SOC limits; in the last stage the terminal band."""
-        return self.battery.stop + 2
+        return self._boxes + 2
 
     @property
     def box_on(self) -> int:
         """0 <= sigma <= 1; sigma = 1 where the battery alone cannot meet the demand."""
-        return self.battery.stop + 3
+        return self._boxes + 3
 
     @property
     def t_cl_min(self) -> int:
         """T + slack >= T_min."""
-        return self.battery.stop + 4
+        return self._boxes + 4
 
     @property
     def t_cl_max(self) -> int:
         """T - slack <= T_max."""
-        return self.battery.stop + 5
+        return self._boxes + 5
 
     @property
     def box_slack(self) -> int:
         """Slack >= 0."""
-        return self.battery.stop + 6
+        return self._boxes + 6
 
     @property
     def count(self) -> int:
         """Rows of a stage."""
-        return self.battery.stop + 7
+        return self._boxes + 7
 
 
 class QpStructure:
@@ -137,7 +142,7 @@ class QpStructure:
 
     def data(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Order the entries (n, entries) as the data vector of the CSC matrix."""
-        return values.ravel()[self._order]
+        return np.asarray(values.ravel()[self._order])
 
     def matrix_of(self, data: NDArray[np.float64]) -> sp.csc_matrix:
         """Build A from its data vector; only set-up and tests need it."""

@@ -24,9 +24,10 @@ def fuel_power_w(engine: Engine, speed_rpm: ArrayLike, power_w: ArrayLike) -> ND
     -------
     fuel power in W, same shape; the torque limit is not checked here
     """
-    friction = np.interp(speed_rpm, engine.friction_speed_rpm, engine.friction_kj_per_rev_l)
-    pumping_w = 1e3 * friction * engine.displacement_l * np.asarray(speed_rpm) / 60.0
-    return pumping_w + np.asarray(power_w) / engine.indicated_efficiency
+    speed = np.asarray(speed_rpm, dtype=float)
+    friction = np.interp(speed, engine.friction_speed_rpm, engine.friction_kj_per_rev_l)
+    pumping_w = 1e3 * friction * engine.displacement_l * speed / 60.0
+    return np.asarray(pumping_w + np.asarray(power_w) / engine.indicated_efficiency)
 
 
 class OptimalLine:

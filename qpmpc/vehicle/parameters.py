@@ -6,6 +6,7 @@ keys works as well. ``Vehicle.with_settings`` applies dotted overrides such as
 """
 
 from importlib import resources
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -29,7 +30,7 @@ class Section(BaseModel):
 
 
 def _require_increasing(name: str, values: tuple[float, ...]) -> None:
-    if any(b <= a for a, b in zip(values, values[1:], strict=False)):
+    if any(b <= a for a, b in pairwise(values)):
         raise ValueError(f"{name} must increase from entry to entry")
 
 
