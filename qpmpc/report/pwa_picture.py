@@ -54,4 +54,5 @@ def _error(axes: Axes, curve: PwaCurve) -> None:
     axes.axhline(-curve.fit.below / curve.y_unit, **LIMIT)
     axes.set_ylabel(f"fit minus curve {curve.y_unit_name}".strip())
     axes.set_xlabel(curve.x_label)
-    axes.legend(frameon=False, fontsize=8, loc="lower left")
+    axes.margins(y=0.25)
+    axes.legend(frameon=False, fontsize=8, loc="lower left", borderaxespad=0.0)

@@ -1,4 +1,4 @@
-"""Picture of runs on one cycle: speed, powers, SOC, coolant and fuel over time."""
+"""Picture of runs on one cycle: speed, power split, SOC, coolant and fuel over time."""
 
 from collections.abc import Sequence
 
@@ -6,89 +6,92 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from qpmpc.report.style import BLACK, LIMIT, line_style, png, tidy
+from qpmpc.report.style import BLACK, BLUE, LIMIT, ORANGE, line_style, png, tidy
 from qpmpc.results import Run
 
-PANELS = (
-    # title, height
-    ("speed", 0.7),
-    ("demand", 0.9),
-    ("engine", 1.1),
-    ("battery", 1.1),
-    ("soc", 1.0),
-    ("coolant", 1.0),
-    ("fuel", 1.0),
-)
+WIDTH_IN, UNIT_IN = 9.0, 1.25
+SPEED_HEIGHT, SPLIT_HEIGHT, STATE_HEIGHT = 0.7, 1.0, 1.15
 
 
 def draw_trajectories(runs: Sequence[Run]) -> bytes:
-    """Draw runs of one vehicle on one cycle over each other.
+    """Draw runs of one vehicle on one cycle.
+
+    Each has a panel for its power split; SOC, coolant and fuel are drawn over each other.
 
     Returns
     -------
     PNG
     """
-    heights = [height for _, height in PANELS]
-    figure = Figure(figsize=(9.0, 1.35 * sum(heights) + 0.9), layout="constrained")
-    grid = figure.add_gridspec(len(PANELS), 1, height_ratios=heights)
-    first = figure.add_subplot(grid[0])
-    panels = [first, *(figure.add_subplot(grid[i], sharex=first) for i in range(1, len(PANELS)))]
-    speed, demand, engine, battery, soc, coolant, fuel = panels
-    _road(speed, demand, runs[0])
-    for i, run in enumerate(runs):
+    heights = [SPEED_HEIGHT, *[SPLIT_HEIGHT] * len(runs), *[STATE_HEIGHT] * 3]
+    figure = Figure(figsize=(WIDTH_IN, UNIT_IN * sum(heights) + 0.6), layout="constrained")
+    column = figure.subplots(
+        len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights}
+    )
+    panels: list[Axes] = column[:, 0].tolist()
+    speed, *splits, soc, coolant, fuel = panels
+    _speed(speed, runs[0])
+    for i, (axes, run) in enumerate(zip(splits, runs, strict=True)):
+        axes.sharey(splits[0])
+        _power_split(axes, run, i)
         _states(soc, coolant, fuel, run, i)
-        _powers(engine, battery, run, i)
     _limits(soc, coolant, runs[0])
     for axes in panels:
         tidy(axes)
-        axes.tick_params(labelbottom=axes is fuel)
-    figure.align_ylabels(panels)
+    splits[0].legend(ncols=3, **LEGEND)
+    soc.legend(ncols=len(runs) + 1, **LEGEND)
     fuel.set_xlabel("time, s")
-    steps = len(runs[0].trajectory.fuel_g)
-    fuel.set_xlim(0, steps)
-    handles, labels = soc.get_legend_handles_labels()
-    figure.legend(
-        handles,
-        labels,
-        loc="outside upper center",
-        ncols=min(len(labels), 5),
-        frameon=False,
-        fontsize=9,
-    )
-    figure.suptitle(_title(runs[0]), fontsize=11)
+    fuel.set_xlim(0, len(runs[0].trajectory.fuel_g))
+    figure.align_ylabels(panels)
     return png(figure)
 
 
-def _title(run: Run) -> str:
-    thermal = run.vehicle.thermal
-    return (
-        f"{run.cycle}, {run.distance_km:.2f} km, {run.vehicle.name}, ambient "
-        f"{thermal.t_amb_degc:g} °C"
+# Above its panel, at the right, where it hides nothing.
+LEGEND = {
+    "loc": "lower right",
+    "bbox_to_anchor": (1.0, 0.98),
+    "frameon": False,
+    "fontsize": 8.5,
+    "borderaxespad": 0.0,
+}
+
+
+def _speed(axes: Axes, run: Run) -> None:
+    speed_kmh = 3.6 * run.trajectory.speed_mps
+    axes.fill_between(
+        np.arange(len(speed_kmh)) + 0.5,
+        speed_kmh,
+        color="#cccccc",
+        edgecolor=BLACK,
+        linewidth=0.6,
+    )
+    axes.set_ylabel("speed\nkm/h")
+    axes.set_ylim(bottom=0)
+    axes.set_title(
+        f"{run.cycle}: {run.distance_km:.2f} km, {run.vehicle.name}, "
+        f"ambient {run.vehicle.thermal.t_amb_degc:g} °C",
+        fontsize=11,
     )
 
 
-def _road(speed: Axes, demand: Axes, run: Run) -> None:
-    trajectory = run.trajectory
-    time = np.arange(len(trajectory.speed_mps) + 1)
-    speed.fill_between(
-        time[:-1] + 0.5, trajectory.speed_mps * 3.6, color="#cccccc", edgecolor=BLACK, linewidth=0.6
-    )
-    speed.set_ylabel("speed\nkm/h")
-    speed.set_ylim(bottom=0)
-    demand.stairs(trajectory.demand_w / 1e3, time, color=BLACK, linewidth=0.8, baseline=None)
-    demand.axhline(0, color=BLACK, linewidth=0.5)
-    demand.set_ylabel("demand\nkW")
-
-
-def _powers(engine: Axes, battery: Axes, run: Run, index: int) -> None:
+def _power_split(axes: Axes, run: Run, index: int) -> None:
+    """Demand, engine and battery; demand plus auxiliaries is engine plus battery plus brakes."""
     trajectory = run.trajectory
     edges = np.arange(len(trajectory.p_eng_w) + 1)
-    style = line_style(run.controller, index) | {"linewidth": 0.9}
-    engine.stairs(trajectory.p_eng_w / 1e3, edges, baseline=None, **style)
-    battery.stairs(trajectory.p_bat_w / 1e3, edges, baseline=None, **style)
-    engine.set_ylabel("engine\nkW")
-    battery.set_ylabel("battery\nkW")
-    battery.axhline(0, color=BLACK, linewidth=0.5)
+    axes.stairs(trajectory.demand_w / 1e3, edges, fill=True, color="#bbbbbb", label="demand")
+    axes.stairs(trajectory.p_eng_w / 1e3, edges, fill=True, color=ORANGE, label="engine")
+    axes.stairs(
+        trajectory.p_bat_w / 1e3, edges, baseline=None, color=BLUE, linewidth=0.8, label="battery"
+    )
+    axes.axhline(0, color=BLACK, linewidth=0.5)
+    axes.set_ylabel("power\nkW")
+    axes.set_title(
+        run.controller,
+        loc="left",
+        fontsize=9.5,
+        pad=3,
+        fontweight="bold",
+        color=line_style(run.controller, index)["color"],
+    )
 
 
 def _states(soc: Axes, coolant: Axes, fuel: Axes, run: Run, index: int) -> None:
