@@ -11,7 +11,6 @@ from qpmpc.controllers.rule_based import RuleBased, RuleBasedSettings
 from qpmpc.errors import InputError
 from qpmpc.preview.forecast import Trace
 from qpmpc.preview.horizon import HorizonSettings
-from qpmpc.qp.stage_qp import QpSettings
 from qpmpc.settings import apply_settings, validated
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.plant import Plant
@@ -19,7 +18,6 @@ from qpmpc.verification.dynamic_programming.settings import DpSettings
 
 PAPER = MhQpSettings(
     horizon=HorizonSettings(short_stages=20, blocks=0, block_s=20, classes=1),
-    qp=QpSettings(terminal_low=0.99, terminal_high=1.01),
 )
 
 
