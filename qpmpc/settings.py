@@ -35,7 +35,9 @@ def validated(model: type[Model], data: dict[str, Any], owner: str) -> Model:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        first = error.errors()[0]
+        found = error.errors()
+        # A misspelt key is both an extra one and a missing one: name what the user wrote.
+        first = next((e for e in found if e["type"] == "extra_forbidden"), found[0])
         key = ".".join(str(part) for part in first["loc"])
         problem = first["msg"].removeprefix("Value error, ")
         given = first["input"]

@@ -104,7 +104,7 @@ def _tangent_pieces(
         inside = max(float(surplus[j - 1]), 0.0)
         at = float(x[j - 1] + inside / (inside - surplus[j]) * (x[j] - x[j - 1]))
         value = value + slope * (at - starts[-1])
-        i = j - 1
+        i = int(np.searchsorted(x, at, side="right")) - 1
 
 
 def fit_convex(

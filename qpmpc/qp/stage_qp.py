@@ -252,7 +252,8 @@ class StageQp:
         structure, units = self.structure, self.units
         stretch = np.maximum(duration_s, SHORTEST_SCALE_S) ** -units.duration_exponent
         column = self._unit * np.where(self._is_rate, stretch[:, None], 1.0)
-        before = np.roll(column, 1, axis=0)
+        before = np.zeros_like(column)  # the first stage has none: its entries do not count
+        before[1:] = column[:-1]
         entry_scale = np.where(
             structure.entry_before, before[:, structure.entry_var], column[:, structure.entry_var]
         )

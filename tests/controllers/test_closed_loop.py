@@ -1,0 +1,154 @@
+"""Closed loops on real cycles: fuel, limits, the degradation ladder, determinism."""
+
+import numpy as np
+import pytest
+
+from qpmpc.controllers.factory import (
+    ControllerSettings,
+    controller_names,
+    make_controller,
+    split_settings,
+)
+from qpmpc.controllers.mh_qp import MhQp
+from qpmpc.cycles import load_cycle
+from qpmpc.errors import InputError
+from qpmpc.preview import Trace
+from qpmpc.simulate import simulate
+from qpmpc.solvers import Osqp, QpSolution, Status
+from qpmpc.vehicle import Plant, load_vehicle
+
+NO_VIOLATION = {"soc": 0.0, "t_cl_degc": 0.0, "power_w": 0.0}
+
+
+@pytest.fixture(scope="module")
+def runs():
+    names = ("nycc", "nedc-truncated")
+    return {
+        (cycle, controller): simulate(load_cycle(cycle), controller, load_vehicle())
+        for cycle in names
+        for controller in ("rule-based", "mh-qp", "mh-qp-paper")
+    }
+
+
+@pytest.mark.parametrize(("cycle", "saving"), [("nycc", 0.20), ("nedc-truncated", 0.025)])
+def test_mh_qp_saves_against_the_rules(runs, cycle, saving):
+    rules, mpc = runs[cycle, "rule-based"], runs[cycle, "mh-qp"]
+    assert rules.comparable
+    assert mpc.comparable
+    assert mpc.fuel_soc_balanced_g <= (1.0 - saving) * rules.fuel_soc_balanced_g
+
+
+def test_no_limit_is_violated_and_no_fallback_is_used(runs):
+    for run in runs.values():
+        summary = run.summary()
+        assert summary["violations"] == NO_VIOLATION
+        assert summary["fallback_steps"] == 0
+
+
+@pytest.mark.parametrize("cycle", ["udds", "hwfet", "wltc-3b"])
+def test_longer_cycles_stay_within_limits(cycle):
+    summary = simulate(load_cycle(cycle), "mh-qp", load_vehicle()).summary()
+    assert summary["violations"] == NO_VIOLATION
+    assert summary["comparable"]
+
+
+def test_the_relaxation_is_tight_and_nearly_integral(runs):
+    summary = runs["nycc", "mh-qp"].summary()
+    assert summary["relaxation_gap"]["mean"] < 0.02  # 50 iterations, not a converged solution
+    assert summary["sigma_integral_share"] > 0.9
+
+
+def test_charge_is_sustained(runs):
+    for run in runs.values():
+        # The battery's last seconds are decided a second at a time: one engine burst, 0.5 %.
+        assert run.trajectory.soc[-1] == pytest.approx(0.6, abs=0.005)
+
+
+def test_colder_weather_costs_more_fuel():
+    fuel = [
+        simulate(
+            load_cycle("nycc"), "mh-qp", load_vehicle().with_settings({"thermal.t_amb_degc": t})
+        ).fuel_soc_balanced_g
+        for t in (-15.0, -7.0, 10.0)
+    ]
+    assert fuel[0] > fuel[1] > fuel[2]
+
+
+def test_a_run_repeats_bit_for_bit(runs):
+    again = simulate(load_cycle("nycc"), "mh-qp", load_vehicle())
+    before = runs["nycc", "mh-qp"].trajectory
+    np.testing.assert_array_equal(again.trajectory.fuel_g, before.fuel_g)
+    np.testing.assert_array_equal(again.trajectory.soc, before.soc)
+
+
+class Flaky(Osqp):
+    """OSQP that fails in chosen solves (counted after the departure)."""
+
+    def __init__(self, failing):
+        super().__init__()
+        self._failing, self._count = failing, 0
+
+    def solve(self, data, z, y, cold=False):
+        solution = super().solve(data, z, y, cold)
+        if cold:
+            return solution
+        self._count += 1
+        if self._count in self._failing:
+            nothing = np.full_like(solution.z, np.nan)
+            return QpSolution(nothing, solution.y, Status.FAILED, 0, 0.0)
+        return solution
+
+
+def _with_solver(cycle, solver):
+    plant = Plant(load_vehicle())
+    truth = Trace.of(cycle, plant.vehicle)
+    settings = ControllerSettings()
+    controller = MhQp("mh-qp", plant, truth, truth, settings.mh_qp, settings.rule_based, solver)
+    return simulate(cycle, controller, plant.vehicle)
+
+
+def test_one_failure_is_bridged_by_the_shifted_plan():
+    run = _with_solver(load_cycle("nycc"), Flaky({50, 51, 200}))
+    used = [(t, rung) for t, rung in enumerate(run.trajectory.fallback) if rung]
+    assert {rung for _, rung in used} == {"shifted plan"}
+    assert run.summary()["violations"] == NO_VIOLATION
+
+
+class Dead(Osqp):
+    """A solver that never gives a usable answer."""
+
+    def solve(self, data, z, y, cold=False):
+        return QpSolution(np.full_like(data.q, np.nan), data.lower, Status.INFEASIBLE, 0, 0.0)
+
+
+def test_a_dead_solver_leaves_the_rules_in_charge():
+    run = _with_solver(load_cycle("nycc"), Dead())
+    assert set(run.trajectory.fallback) == {"rule-based"}
+    assert run.summary()["violations"] == NO_VIOLATION
+    assert run.summary()["fallback_steps"] == 598
+
+
+def test_rules_alone_end_where_they_began():
+    run = simulate(load_cycle("udds"), "rule-based", load_vehicle("prius-liion"))
+    assert run.comparable
+    unbalanced = ControllerSettings().with_settings({"rule_based.balance": False})
+    raw = simulate(load_cycle("nycc"), "rule-based", load_vehicle(), settings=unbalanced)
+    assert not raw.comparable  # 17 % of its fuel went into the battery
+
+
+def test_names_and_settings():
+    plant = Plant(load_vehicle())
+    truth = Trace.of(load_cycle("nycc"), plant.vehicle)
+    assert controller_names()[0] == "mh-qp"
+    with pytest.raises(InputError, match="rule-based"):
+        make_controller("rules", plant, truth)
+    vehicle, controllers = split_settings({"trip.soc_init": 0.5, "mh_qp.osqp.iterations": 25})
+    assert (list(vehicle), list(controllers)) == (["trip.soc_init"], ["mh_qp.osqp.iterations"])
+    assert ControllerSettings().with_settings(controllers).mh_qp.osqp.iterations == 25
+    for bad in ("nonsense.x", "name"):
+        with pytest.raises(InputError, match=bad):
+            split_settings({bad: 1})
+    with pytest.raises(InputError, match="mh_qp"):
+        ControllerSettings().with_settings({"mh_qp": 1})
+    with pytest.raises(InputError, match="iterations"):
+        ControllerSettings().with_settings({"mh_qp.osqp.iterations": 0})

@@ -1,0 +1,85 @@
+"""Stages: what the horizon says of the road is what the road is, in a fixed number of slots."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from qpmpc.cycles import load_cycle
+from qpmpc.preview import HorizonSettings, StageBuilder, Trace
+from qpmpc.vehicle import load_vehicle
+
+VEHICLE = load_vehicle()
+NYCC = Trace.of(load_cycle("nycc"), VEHICLE)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    step=st.integers(0, NYCC.steps - 1),
+    short=st.integers(1, 30),
+    blocks=st.integers(1, 40),
+    classes=st.sampled_from([1, 3]),
+)
+def test_time_energy_and_distance_ahead_are_conserved(step, short, blocks, classes):
+    layout = HorizonSettings(short_stages=short, blocks=blocks, classes=classes)
+    builder = StageBuilder(VEHICLE, NYCC, NYCC, layout)
+    stages = builder.at(step)
+    net = NYCC.battery_side_w(VEHICLE)[step:]
+    assert len(stages.duration_s) == builder.count  # one dimension from departure to arrival
+    assert stages.duration_s.sum() == pytest.approx(NYCC.steps - step)
+    assert stages.duration_s @ stages.net_w == pytest.approx(net.sum(), abs=1e-3)
+    ahead = NYCC.speed_mps[step:].sum()
+    assert stages.duration_s @ stages.speed_mps == pytest.approx(ahead, abs=1e-6)
+    assert np.all(stages.duration_s >= 0.0)
+
+
+def test_short_stages_are_the_next_seconds():
+    builder = StageBuilder(VEHICLE, NYCC, NYCC, HorizonSettings(short_stages=10))
+    stages = builder.at(100)
+    np.testing.assert_array_equal(stages.duration_s[:10], 1.0)
+    expected = NYCC.battery_side_w(VEHICLE)[100:110]
+    np.testing.assert_allclose(stages.net_w[:10], expected)
+
+
+def test_long_stages_hold_their_demand_class():
+    layout = HorizonSettings()
+    stages = StageBuilder(VEHICLE, NYCC, NYCC, layout).at(0)
+    aux = VEHICLE.battery.aux_power_w
+    for offset, low, high in (
+        (0, layout.class_hard_w, np.inf),
+        (1, layout.class_braking_w, layout.class_hard_w),
+        (2, -np.inf, layout.class_braking_w),
+    ):
+        demand = stages.net_w[layout.short_stages + offset :: 3] - aux
+        there = stages.duration_s[layout.short_stages + offset :: 3] > 0
+        assert np.all(demand[there] >= low - 1e-9)
+        assert np.all(demand[there] <= high + 1e-9)
+
+
+def test_the_forecast_fills_the_long_horizon_only():
+    twice = Trace(2.0 * NYCC.demand_w, NYCC.speed_mps)
+    builder = StageBuilder(VEHICLE, NYCC, twice, HorizonSettings())
+    honest = StageBuilder(VEHICLE, NYCC, NYCC, HorizonSettings())
+    short = slice(0, 5)
+    np.testing.assert_allclose(builder.at(40).net_w[short], honest.at(40).net_w[short])
+    assert not np.allclose(builder.at(40).net_w[5:], honest.at(40).net_w[5:])
+
+
+def test_braking_is_clipped_at_the_charge_limit():
+    hard = Trace(np.array([-60e3, 150e3]), np.array([20.0, 20.0]))
+    net = hard.battery_side_w(VEHICLE)
+    assert net.tolist() == [-25e3, 27e3 + 71e3]
+
+
+def test_shift_moves_short_stages_up_and_keeps_long_ones():
+    builder = StageBuilder(VEHICLE, NYCC, NYCC, HorizonSettings(short_stages=4))
+    source = builder.shift().tolist()
+    assert source[:4] == [1, 2, 3, 3]
+    assert source[4:] == list(range(4, builder.count))
+
+
+def test_a_block_length_covers_the_trip():
+    for steps in (1, 7, 598, 790, 1800):
+        layout = HorizonSettings()
+        assert layout.block_count(steps) * layout.block_length_s(steps) >= steps
+        assert layout.block_count(steps) <= layout.blocks

@@ -1,0 +1,161 @@
+"""The QP: fixed structure, consistent scaling, and the mathematics it claims."""
+
+import numpy as np
+import pytest
+import scipy.optimize
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from qpmpc.cycles import load_cycle
+from qpmpc.preview import HorizonSettings, StageBuilder, Stages, Trace
+from qpmpc.pwa import PwaModel
+from qpmpc.qp import VARS, Linearisation, QpSettings, ScalingSettings, StageQp, Var
+from qpmpc.vehicle import load_vehicle
+
+VEHICLE = load_vehicle()
+MODEL = PwaModel.of(VEHICLE)
+TRACE = Trace.of(load_cycle("nycc"), VEHICLE)
+BUILDER = StageBuilder(VEHICLE, TRACE, TRACE, HorizonSettings())
+
+
+def _qp(**settings):
+    return StageQp(VEHICLE, MODEL, BUILDER.count, QpSettings(**settings), ScalingSettings())
+
+
+def _about(n=BUILDER.count, t_cl_degc=50.0, fuel=0.3):
+    return Linearisation(np.full(n, t_cl_degc), np.full(n, fuel))
+
+
+def _unscaled(qp, data):
+    """A, lower, upper and q in SI units."""
+    a = qp.structure.matrix_of(data.a_data).toarray()
+    s = data.scaling
+    return (
+        a / s.row[:, None] / s.column[None, :],
+        data.lower / s.row,
+        data.upper / s.row,
+        data.q / s.column / s.cost,
+    )
+
+
+def test_updating_values_equals_building_afresh():
+    used = _qp()
+    for step in (0, 250, 597, 3):
+        used.update(BUILDER.at(step), 0.55 + step / 1e4, 45.0, _about())
+    a = used.update(BUILDER.at(120), 0.6, 50.0, _about())
+    b = _qp().update(BUILDER.at(120), 0.6, 50.0, _about())
+    for field in ("hessian", "q", "a_data", "lower", "upper"):
+        np.testing.assert_array_equal(getattr(a, field), getattr(b, field))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    step=st.integers(0, 597),
+    soc=st.floats(0.38, 0.82),
+    t_cl_degc=st.floats(-10.0, 95.0),
+    fuel=st.floats(0.0, 4.0),
+)
+def test_values_are_fit_for_a_fixed_iteration_solver(step, soc, t_cl_degc, fuel):
+    qp = _qp()
+    data = qp.update(BUILDER.at(step), soc, t_cl_degc, _about(t_cl_degc=t_cl_degc, fuel=fuel))
+    assert np.isfinite(data.q).all()
+    assert np.isfinite(data.a_data).all()
+    assert np.all(data.lower <= data.upper)
+    # No row may turn into an equality or back (the solver's step size depends on it).
+    rows = qp.rows.count
+    equality = (data.upper - data.lower < 1e-4).reshape(-1, rows)
+    assert equality[:, qp.rows.soc].all()
+    assert not np.delete(equality, qp.rows.soc, axis=1).any()
+    norms = np.sqrt(np.square(qp.structure.matrix_of(data.a_data).toarray()).sum(axis=1))
+    np.testing.assert_allclose(norms, 1.0, rtol=1e-12)
+
+
+def test_masked_stages_pass_the_state_on_at_no_cost():
+    stages = BUILDER.at(560)
+    qp = _qp()
+    a, _, _, q = _unscaled(qp, qp.update(stages, 0.6, 50.0, _about()))
+    masked = np.flatnonzero(stages.duration_s == 0.0)
+    assert len(masked) > 10
+    for k in masked:
+        assert q[k * VARS + Var.FUEL] == 0.0
+        row = a[k * qp.rows.count + qp.rows.soc]
+        expected = np.zeros_like(row)
+        expected[k * VARS + Var.SOC], expected[(k - 1) * VARS + Var.SOC] = 1.0, -1.0
+        np.testing.assert_allclose(row, expected, atol=1e-12)
+
+
+def _lowest(qp, data):
+    """Solve the QP as a linear program (regularisation left out) with an independent solver."""
+    a, lower, upper, q = _unscaled(qp, data)
+    rows = [
+        scipy.optimize.LinearConstraint(a, lower, upper),
+    ]
+    result = scipy.optimize.milp(q, constraints=rows, bounds=scipy.optimize.Bounds())
+    assert result.success
+    return result.x.reshape(-1, VARS), result.fun
+
+
+def test_one_stage_optimum_is_the_model_itself():
+    # One second, engine forced on by a demand the battery cannot meet: F, G and the states are
+    # then the PWA curves and the plant's balances, by hand.
+    net = VEHICLE.battery.power_discharge_max_w + 10e3
+    stages = Stages(np.array([1.0]), np.array([net]), np.array([20.0]))
+    qp = StageQp(VEHICLE, MODEL, 1, QpSettings(terminal_low=0.7), ScalingSettings())
+    x, _ = _lowest(qp, qp.update(stages, 0.6, 60.0, _about(1, 60.0, 0.0)))
+    sigma, p_eng = x[0, Var.ON], x[0, Var.P_ENG]
+    assert sigma >= 0.99
+    assert p_eng >= 10e3 - 1e-6
+    fuel = (MODEL.fuel.slope * p_eng + MODEL.fuel.intercept * sigma).max()
+    assert x[0, Var.FUEL] == pytest.approx(fuel, rel=1e-9)
+    energy = MODEL.battery_energy_j
+    assert x[0, Var.SOC] == pytest.approx(0.6 - x[0, Var.INTERNAL] / energy, abs=1e-9)
+
+
+def test_constant_demand_without_thermal_coupling_is_charge_sustaining():
+    # Hot engine (alpha = 1), long constant demand at which running the engine all the time at the
+    # demand is optimal: battery use only adds losses, so E = P0 in every stage.
+    net = 12e3
+    n = 6
+    stages = Stages(np.full(n, 10.0), np.full(n, net), np.full(n, 20.0))
+    vehicle = VEHICLE.with_settings({"cold_engine.k": 0.0, "trip.t_cl_init_degc": 70.0})
+    model = PwaModel.of(vehicle)
+    qp = StageQp(vehicle, model, n, QpSettings(), ScalingSettings())
+    data = qp.update(stages, 0.6, 70.0, _about(n, 70.0, 0.5))
+    _, cost = _lowest(qp, data)
+    at_demand = n * 10.0 * float(model.fuel(net))
+    assert cost <= at_demand * (1.0 + 1e-9) + 1.0
+    # losses of the PWA battery at zero power are below its error bound: nothing to gain beyond it
+    gain = n * 10.0 * model.battery.above * model.fuel.slope.max()
+    assert cost >= at_demand - gain - 1e-6
+
+
+def test_terminal_band_and_reachability():
+    qp = _qp(terminal_low=1.0, terminal_high=1.01)
+    data = qp.update(BUILDER.at(0), 0.6, 50.0, _about())
+    rows = qp.rows
+    last = (BUILDER.count - 1) * rows.count + rows.box_soc
+    assert data.lower[last] / data.scaling.row[last] == pytest.approx(0.6)
+    assert data.upper[last] / data.scaling.row[last] == pytest.approx(0.606)
+    # Two seconds before the end with an empty battery the band cannot be met: the limit gives way.
+    data = qp.update(BUILDER.at(596), 0.41, 50.0, _about())
+    low = data.lower[last] / data.scaling.row[last]
+    assert low < 0.44
+
+
+def test_quadratic_terminal_cost_pulls_to_the_reference():
+    qp = _qp(soc_penalty_g=1e4)
+    data = qp.update(BUILDER.at(0), 0.6, 50.0, _about())
+    assert (data.hessian > 1e-3).sum() == 1
+    i = int(np.argmax(data.hessian))
+    z = -data.q[i] / data.hessian[i]
+    assert z * data.scaling.column[i] == pytest.approx(VEHICLE.trip.soc_init)
+
+
+def test_scaling_leads_back():
+    qp = _qp()
+    scaling = qp.update(BUILDER.at(10), 0.6, 50.0, _about()).scaling
+    rng = np.random.default_rng(3)
+    x = rng.normal(size=scaling.column.shape)
+    y = rng.normal(size=scaling.row.shape)
+    np.testing.assert_allclose(scaling.primal(scaling.solver_primal(x)), x)
+    np.testing.assert_allclose(scaling.dual(scaling.solver_dual(y)), y)

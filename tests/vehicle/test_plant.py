@@ -1,0 +1,125 @@
+"""The plant: its books balance, and it does what its closed forms say."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from qpmpc.cycles import Cycle, load_cycle
+from qpmpc.vehicle import Command, Plant, PlantState, demand_w, load_vehicle
+
+PLANT = Plant(load_vehicle())
+BALANCE = 1e-9  # relative to the power turned over in the step, as promised in the docs
+
+
+@given(
+    soc=st.floats(0.4, 0.8),
+    t_cl_degc=st.floats(-7.0, 95.0),
+    on=st.booleans(),
+    p_eng_w=st.floats(0.0, 71e3),
+    demand=st.floats(-40e3, 60e3),
+    speed_mps=st.floats(0.0, 40.0),
+)
+def test_energy_is_conserved_in_every_step(soc, t_cl_degc, on, p_eng_w, demand, speed_mps):
+    state = PlantState(soc, t_cl_degc)
+    after, f = PLANT.step(state, Command(on, p_eng_w if on else 0.0), demand, speed_mps)
+    battery, thermal = PLANT.vehicle.battery, PLANT.vehicle.thermal
+    current = f.internal_w / PLANT.battery.open_circuit.at(soc)
+    resistance = (PLANT.battery.discharge if f.p_bat_w >= 0 else PLANT.battery.charge).at(soc)
+    saturated = PLANT.battery.open_circuit.at(soc) ** 2 < 4 * resistance * f.p_bat_w
+    joule_w = f.internal_w - f.p_bat_w if saturated else resistance * current**2
+    stored_w = thermal.heat_capacity_j_per_k * (after.t_cl_degc - t_cl_degc)
+    chemical_w = f.fuel_w + f.internal_w
+    work_w = demand + battery.aux_power_w + f.p_friction_w
+    heat_w = joule_w + f.exhaust_w + f.air_w + f.radiator_w + f.cabin_w + stored_w
+    turnover = abs(f.fuel_w) + abs(f.internal_w) + abs(demand) + 1e3
+    assert chemical_w == pytest.approx(work_w + heat_w, abs=BALANCE * turnover + 1e-6)
+    drawn_w = (soc - after.soc) * PLANT.battery.charge_c * PLANT.battery.open_circuit.at(soc)
+    assert drawn_w == pytest.approx(f.internal_w, abs=BALANCE * turnover + 1e-5)
+
+
+def test_discharge_lowers_soc_and_the_engine_burns_only_when_on():
+    state = PLANT.initial_state()
+    after, flows = PLANT.step(state, Command(False, 0.0), 5e3, 10.0)
+    assert after.soc < state.soc
+    assert flows.fuel_g == 0.0
+    _, idle = PLANT.step(state, Command(True, 0.0), 5e3, 10.0)
+    assert idle.fuel_g > 0.0  # engine on at zero power is not off
+
+
+@pytest.mark.parametrize(
+    ("t_amb_degc", "seconds"), [(-15.0, 626), (-7.0, 654), (0.0, 680), (10.0, 723)]
+)
+def test_coolant_cools_as_the_differential_equation_says(t_amb_degc, seconds):
+    # C dT/dt = -UA (T - T_amb) - Q: T falls from 60 to 40 C in a time known in closed form.
+    vehicle = load_vehicle().with_settings(
+        {"thermal.t_amb_degc": t_amb_degc, "trip.t_cl_init_degc": 60.0}
+    )
+    plant, speed_mps = Plant(vehicle), 8.0
+    th = vehicle.thermal
+    ua = th.ua0_w_per_k + th.ua1_w_per_k_per_mps * speed_mps
+    sink = t_amb_degc - th.cabin_heat_w / ua
+    exact = th.heat_capacity_j_per_k / ua * math.log((60.0 - sink) / (40.0 - sink))
+    state, steps = plant.initial_state(), 0
+    while state.t_cl_degc > 40.0:
+        state, _ = plant.step(state, Command(False, 0.0), 0.0, speed_mps)
+        steps += 1
+    assert steps == pytest.approx(exact, abs=2)
+    assert steps == pytest.approx(seconds, abs=2)  # the model's published figures
+
+
+def test_braking_beyond_the_charge_limit_goes_to_the_friction_brakes():
+    battery = PLANT.vehicle.battery
+    _, f = PLANT.step(PlantState(0.6, 50.0), Command(False, 0.0), -40e3, 20.0)
+    assert f.p_bat_w == pytest.approx(-battery.power_charge_max_w)
+    assert f.p_friction_w == pytest.approx(40e3 - battery.aux_power_w - 25e3)
+    assert f.power_excess_w == 0.0
+
+
+def test_a_full_battery_takes_no_more_than_fills_it():
+    soc_max = PLANT.vehicle.battery.soc_max
+    after, f = PLANT.step(PlantState(soc_max - 1e-4, 50.0), Command(False, 0.0), -20e3, 20.0)
+    assert after.soc <= soc_max + 1e-12
+    assert f.p_friction_w > 0.0
+
+
+def test_commands_beyond_the_limits_are_reported():
+    _, f = PLANT.step(PlantState(0.6, 50.0), Command(True, 80e3), 50e3, 20.0)
+    assert f.power_excess_w >= 9e3
+    _, f = PLANT.step(PlantState(0.6, 50.0), Command(False, 0.0), 40e3, 20.0)
+    assert f.power_excess_w == pytest.approx(40e3 + 400.0 - 27e3)
+
+
+def test_start_fuel_is_charged_once_a_start():
+    plant = Plant(load_vehicle().with_settings({"engine.start_fuel_g": 0.5}))
+    first, a = plant.step(PlantState(0.6, 50.0), Command(True, 5e3), 5e3, 5.0)
+    _, b = plant.step(
+        PlantState(0.6, 50.0, engine_on=first.engine_on), Command(True, 5e3), 5e3, 5.0
+    )
+    assert a.fuel_g - b.fuel_g == pytest.approx(0.5)
+    assert (a.started, b.started) == (True, False)
+
+
+def test_demand_at_constant_speed_is_the_road_load():
+    chassis = load_vehicle().chassis
+    v = np.full(11, 20.0)
+    cycle = Cycle("constant", np.arange(11.0), v, np.zeros(11))
+    force = 81.278 + 2.93982 * 20.0 + 0.307004 * 400.0
+    np.testing.assert_allclose(demand_w(cycle, chassis), force * 20.0 / 0.88, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("name", "mean_kw"), [("nycc", 0.96), ("nedc-truncated", 4.01)])
+def test_mean_demand_of_the_winter_cycles(name, mean_kw):
+    mean = demand_w(load_cycle(name), load_vehicle().chassis).mean() / 1e3
+    assert mean == pytest.approx(mean_kw, abs=0.006)  # rounding of the published figure
+
+
+def test_climbing_costs_the_potential_energy():
+    chassis = load_vehicle().chassis
+    flat = Cycle("flat", np.arange(11.0), np.full(11, 15.0), np.zeros(11))
+    hill = Cycle("hill", np.arange(11.0), np.full(11, 15.0), np.full(11, 0.05))
+    extra_w = (demand_w(hill, chassis) - demand_w(flat, chassis)) * chassis.eta_drive
+    climb_mps = 15.0 * 0.05 / math.sqrt(1.0 + 0.05**2)
+    np.testing.assert_allclose(extra_w, chassis.mass_kg * 9.81 * climb_mps, rtol=1e-9)
