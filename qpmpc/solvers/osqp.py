@@ -94,8 +94,10 @@ class Osqp:
             x=np.zeros_like(data.q) if z is None else z,
             y=np.zeros_like(data.lower) if y is None else y,
         )
-        result = self._solver.solve()
+        result = self._solver.solve(raise_error=False)
         done = perf_counter()
+        if result.info.status == "interrupted":
+            raise KeyboardInterrupt  # OSQP takes Ctrl-C away from Python while it solves
         return QpSolution(
             z=np.asarray(result.x, dtype=float),
             y=np.asarray(result.y, dtype=float),
