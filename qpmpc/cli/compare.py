@@ -45,7 +45,7 @@ def compare(
     from qpmpc.comparison import compare_runs
     from qpmpc.cycles import load_cycle
     from qpmpc.errors import InputError
-    from qpmpc.report.columns import COMPARE_GROUPS, notes
+    from qpmpc.report.columns import COMPARE_COLUMNS, notes
     from qpmpc.report.write import write_comparison
     from qpmpc.runners import check_names, run
 
@@ -69,6 +69,6 @@ def compare(
     if out is not None:
         remarks += write_comparison(runs, rows, settings, out)
     console = result_console(json_file)
-    print_rows(console, rows, COMPARE_GROUPS, "cycle")
+    print_rows(console, rows, COMPARE_COLUMNS, "cycle")
     for remark in remarks:
         console.print(remark, markup=False)

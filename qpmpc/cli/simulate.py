@@ -34,7 +34,7 @@ def simulate(
     from qpmpc.cli.inputs import check_outputs, load_vehicle_and_settings
     from qpmpc.cli.table import print_rows
     from qpmpc.cycles import load_cycle
-    from qpmpc.report.columns import SIMULATE_GROUPS, notes
+    from qpmpc.report.columns import SIMULATE_COLUMNS, notes
     from qpmpc.report.write import write_run
     from qpmpc.runners import check_names, run
 
@@ -51,6 +51,6 @@ def simulate(
     if out is not None:
         remarks += write_run(finished, out)
     console = result_console(json_file)
-    print_rows(console, [summary], SIMULATE_GROUPS, "cycle")
+    print_rows(console, [summary], SIMULATE_COLUMNS, "cycle")
     for remark in remarks:
         console.print(remark, markup=False)

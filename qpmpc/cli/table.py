@@ -10,41 +10,54 @@ from rich.text import Text
 
 from qpmpc.report.columns import Column, Row, filled
 
+NAME_WIDTH = 20  # longer names of users' files are folded
+
 
 def print_rows(
-    console: Console, rows: Sequence[Row], groups: Sequence[Sequence[Column]], section: str
+    console: Console, rows: Sequence[Row], columns: Sequence[Column], section: str
 ) -> None:
-    """Print rows as one table; where that is too wide, as one table a group of columns.
+    """Print rows as one table; where the window is too narrow, as several below each other.
+
+    Each repeats the columns that name the row. A column without a single figure is left out.
 
     Parameters
     ----------
     rows : data
-    groups : columns; the first group names the row and is repeated in every table
-    section : key of the rows; where its value changes, a rule is drawn
-
-    A column without a single figure is left out.
+    columns : of the table
+    section : key of the rows; where its value changes, a line is left empty
     """
-    names, *others = (filled(group, rows) for group in groups)
-    whole = _table(rows, [*names, *(column for group in others for column in group)], section)
-    if Measurement.get(console, console.options.update(width=10_000), whole).maximum <= (
-        console.width
-    ):
-        console.print(whole)
-        return
-    for group in others:
-        console.print(_table(rows, [*names, *group], section))
+    shown = filled(columns, rows)
+    names = [column for column in shown if column.is_name]
+    part = list(names)
+    for column in shown[len(names) :]:
+        if part != names and _width(console, _table(rows, [*part, column], section)) > (
+            console.width
+        ):
+            console.print(_table(rows, part, section))
+            console.print()
+            part = list(names)
+        part.append(column)
+    console.print(_table(rows, part, section))
+
+
+def _width(console: Console, table: Table) -> int:
+    return Measurement.get(console, console.options.update(width=10_000), table).maximum
 
 
 def _table(rows: Sequence[Row], columns: Sequence[Column], section: str) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, header_style="bold")
+    table = Table(
+        box=box.SIMPLE_HEAD,
+        show_edge=False,
+        pad_edge=False,
+        padding=(0, 1, 0, 0),
+        header_style="bold",
+    )
     for column in columns:
-        # Names may be long and are folded, numbers never.
-        table.add_column(
-            column.title,
-            justify="left" if column.is_name else "right",
-            overflow="fold",
-            no_wrap=not column.is_name,
-        )
+        if column.is_name:
+            longest = max(len(column.title), *(len(column.text(row)) for row in rows))
+            table.add_column(column.title, width=min(longest, NAME_WIDTH), overflow="fold")
+        else:
+            table.add_column(column.title, justify="right", no_wrap=True)
     for i, row in enumerate(rows):
         ends = i + 1 < len(rows) and rows[i + 1][section] != row[section]
         table.add_row(*(Text(column.text(row)) for column in columns), end_section=ends)

@@ -59,7 +59,7 @@ def _share(row: Row) -> str:
     return NONE if share is None else f"{100.0 * share:.1f}"
 
 
-NAME = (
+NAMES = (
     Column("cycle", lambda row: row["cycle"], is_name=True),
     Column("controller", lambda row: row["controller"], is_name=True),
 )
@@ -83,8 +83,8 @@ OPERATION = (
     Column("step ms med / p99 / max", _times),
 )
 
-SIMULATE_GROUPS = (NAME, (*FUEL, *STATE), OPERATION)
-COMPARE_GROUPS = (NAME, (*FUEL, *AGAINST, *STATE), OPERATION)
+SIMULATE_COLUMNS = (*NAMES, *FUEL, *STATE, *OPERATION)
+COMPARE_COLUMNS = (*NAMES, *FUEL, *AGAINST, *STATE, *OPERATION)
 
 
 def filled(columns: Sequence[Column], rows: Sequence[Row]) -> list[Column]:

@@ -10,7 +10,7 @@ from jinja2 import Environment, StrictUndefined
 
 from qpmpc.comparison import OPTIMUM, REFERENCE
 from qpmpc.controllers.factory import ControllerSettings
-from qpmpc.report.columns import COMPARE_GROUPS, Row, filled, notes
+from qpmpc.report.columns import COMPARE_COLUMNS, Row, filled, notes
 from qpmpc.report.provenance import provenance
 from qpmpc.report.units import unit_of
 from qpmpc.results import INTEGRAL, Run
@@ -32,7 +32,7 @@ def compare_html(
     pictures : PNG of each cycle
     """
     vehicle = runs[0].vehicle
-    columns = filled([column for group in COMPARE_GROUPS for column in group], rows)
+    columns = filled(COMPARE_COLUMNS, rows)
     names = {run.controller.replace("-", "_") for run in runs}
     template = files("qpmpc.report").joinpath("compare.html.j2").read_text("utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)

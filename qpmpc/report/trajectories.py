@@ -1,6 +1,7 @@
 """Picture of runs on one cycle: speed, power split, SOC, coolant and fuel over time."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -46,7 +47,7 @@ def draw_trajectories(runs: Sequence[Run]) -> bytes:
 
 
 # Above its panel, at the right, where it hides nothing.
-LEGEND = {
+LEGEND: dict[str, Any] = {
     "loc": "lower right",
     "bbox_to_anchor": (1.0, 0.98),
     "frameon": False,
