@@ -6,6 +6,8 @@ from pydantic import BaseModel, ConfigDict
 
 from qpmpc.controllers.balance import balanced
 from qpmpc.controllers.base import Controller
+from qpmpc.controllers.baseline_mpc import BaselineMpcSettings, baseline_mpc
+from qpmpc.controllers.ecms import Ecms, EcmsSettings
 from qpmpc.controllers.mh_qp import MhQp, MhQpSettings
 from qpmpc.controllers.rule_based import RuleBased, RuleBasedSettings
 from qpmpc.errors import InputError
@@ -29,6 +31,8 @@ class ControllerSettings(BaseModel):
     rule_based: RuleBasedSettings = RuleBasedSettings()
     mh_qp: MhQpSettings = MhQpSettings()
     mh_qp_paper: MhQpSettings = PAPER
+    baseline_mpc: BaselineMpcSettings = BaselineMpcSettings()
+    ecms: EcmsSettings = EcmsSettings()
     dp: DpSettings = DpSettings()
 
     def with_settings(self, settings: dict[str, object]) -> "ControllerSettings":
@@ -85,9 +89,19 @@ def _mh_qp_paper(plant: Plant, truth: Trace, forecast: Trace, s: ControllerSetti
     return MhQp("mh-qp-paper", plant, truth, forecast, s.mh_qp_paper, s.rule_based)
 
 
+def _baseline_mpc(plant: Plant, truth: Trace, forecast: Trace, s: ControllerSettings) -> Controller:
+    return baseline_mpc(plant, truth, s.baseline_mpc, s.rule_based)
+
+
+def _ecms(plant: Plant, truth: Trace, forecast: Trace, s: ControllerSettings) -> Controller:
+    return Ecms(plant, s.ecms, s.rule_based.heat_power_w)
+
+
 _MAKERS: dict[str, Callable[[Plant, Trace, Trace, ControllerSettings], Controller]] = {
     "mh-qp": _mh_qp,
     "mh-qp-paper": _mh_qp_paper,
+    "baseline-mpc": _baseline_mpc,
+    "ecms": _ecms,
     "rule-based": _rule_based,
 }
 

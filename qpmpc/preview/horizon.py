@@ -12,7 +12,8 @@ class HorizonSettings(BaseModel):
     ----------
     short_stages : N stages of 1 s with accurate preview
     blocks : number of equal blocks that the trip is cut into at departure, or
-    block_s : length of a block, s; used when `blocks` is 0
+    block_s : length of a block, s; used when `blocks` is 0. With both 0 there is no long horizon:
+        the short one recedes to arrival
     classes : 3 demand classes a block (hard, easy, braking) or 1 (the mean, as in the paper)
     class_hard_w, class_braking_w : demand above the first is hard, below the second braking
     """
@@ -21,18 +22,19 @@ class HorizonSettings(BaseModel):
 
     short_stages: Annotated[int, Field(ge=1, le=2000)] = 5
     blocks: Annotated[int, Field(ge=0, le=500)] = 7
-    block_s: Annotated[int, Field(ge=1, le=3600)] = 120
+    block_s: Annotated[int, Field(ge=0, le=3600)] = 120
     classes: Literal[1, 3] = 3
     class_hard_w: float = 8000.0
     class_braking_w: float = -500.0
 
     def block_length_s(self, trip_steps: int) -> int:
-        """Length of a block for a trip of that many 1 s steps."""
+        """Length of a block for a trip of that many 1 s steps, 0 if there are none."""
         return -(-trip_steps // self.blocks) if self.blocks else self.block_s
 
     def block_count(self, trip_steps: int) -> int:
         """Number of blocks for a trip of that many 1 s steps."""
-        return -(-trip_steps // self.block_length_s(trip_steps))
+        length_s = self.block_length_s(trip_steps)
+        return -(-trip_steps // length_s) if length_s else 0
 
     def stage_count(self, trip_steps: int) -> int:
         """Number of stages, the same from departure to arrival."""
