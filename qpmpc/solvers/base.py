@@ -32,7 +32,8 @@ class QpSolution:
     z, y : primal and dual, y > 0 at an active upper bound
     status : see `Status`
     iterations : of the solver's own kind
-    solve_s : wall time of the solve alone, s; for reports only, never for decisions
+    solve_s, update_s : wall time of the solve alone and of bringing in new values before it, s;
+        for reports only, never for decisions
     """
 
     z: Floats
@@ -40,6 +41,7 @@ class QpSolution:
     status: Status
     iterations: int
     solve_s: float
+    update_s: float = 0.0
 
     @property
     def usable(self) -> bool:
@@ -76,3 +78,13 @@ def consistent(data: QpData) -> bool:
         and np.isfinite(data.a_data).all()
         and np.all(data.lower <= data.upper)
     )
+
+
+def nothing(data: QpData) -> tuple[Floats, Floats]:
+    """Primal and dual of a QP that has no solution, all nan."""
+    return np.full_like(data.q, np.nan), np.full_like(data.lower, np.nan)
+
+
+def failed(data: QpData) -> QpSolution:
+    """Return the solution of a QP that no solver was given."""
+    return QpSolution(*nothing(data), status=Status.FAILED, iterations=0, solve_s=0.0)

@@ -1,0 +1,85 @@
+"""ProxQP: proximal augmented Lagrangian, dense, persistent and warm-started.
+
+The sparse variant of ProxQP 0.7 and 0.8 never returns on some of these QPs, whatever its iteration
+limits and its start; the dense one solves them all.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from qpmpc.qp.stage_qp import QpData
+from qpmpc.qp.structure import QpStructure
+from qpmpc.solvers.base import Floats, Status
+from qpmpc.solvers.feasibility import is_infeasible
+from qpmpc.solvers.forms import TwoSided
+from qpmpc.solvers.timed import Outcome, TimedSolver, array
+
+_STATUS = {
+    "PROXQP_SOLVED": Status.SOLVED,
+    "PROXQP_MAX_ITER_REACHED": Status.ITERATION_LIMIT,
+    "PROXQP_PRIMAL_INFEASIBLE": Status.INFEASIBLE,
+    "PROXQP_DUAL_INFEASIBLE": Status.INFEASIBLE,
+}
+OUTER_LIMIT, INNER_LIMIT = 100, 300
+
+
+class Proxqp(TimedSolver):
+    """Backend over the native dense ProxQP interface.
+
+    Its own test seldom notices that a problem is infeasible before the iteration limit; there, a
+    linear programme decides.
+    """
+
+    name = "proxqp"
+    package = "proxsuite"
+
+    def _start(self, structure: QpStructure, data: QpData) -> None:
+        self._pattern = structure
+        self._form = TwoSided(structure, data)
+        self._guess = self.module.proxqp.InitialGuess
+        equalities, inequalities = self._form.equalities.rows, self._form.inequalities.rows
+        self._solver: Any = self.module.proxqp.dense.QP(
+            structure.shape[1], len(equalities), len(inequalities)
+        )
+        settings = self._solver.settings
+        settings.eps_abs, settings.eps_rel = self.tolerance, 0.0
+        settings.max_iter, settings.max_iter_in = OUTER_LIMIT, INNER_LIMIT
+        self._solver.init(**self._values(data))
+
+    def _fits(self, data: QpData) -> bool:
+        return self._form.fits(data)
+
+    def _update(self, data: QpData) -> None:
+        self._solver.update(**self._values(data), update_preconditioner=True)
+
+    def _values(self, data: QpData) -> dict[str, Any]:
+        b, low, high = self._form.right_sides(data)
+        return {
+            "H": np.diag(data.hessian),
+            "g": data.q,
+            "A": self._form.equalities.matrix(data).toarray(),
+            "b": b,
+            "C": self._form.inequalities.matrix(data).toarray(),
+            "l": low,
+            "u": high,
+        }
+
+    def _run(self, data: QpData, z: Floats | None, y: Floats | None) -> Outcome:
+        if z is None or y is None:
+            self._start(self._pattern, data)  # what the last solve left behind can mislead it
+            self._solver.settings.initial_guess = self._guess.EQUALITY_CONSTRAINED_INITIAL_GUESS
+            self._solver.solve()
+        else:
+            self._solver.settings.initial_guess = self._guess.WARM_START
+            self._solver.solve(z, *self._form.part(y))
+        result = self._solver.results
+        status = _STATUS.get(result.info.status.name, Status.FAILED)
+        if status is Status.ITERATION_LIMIT and is_infeasible(self._pattern, data):
+            status = Status.INFEASIBLE
+        return Outcome(
+            array(result.x),
+            self._form.join(array(result.y), array(result.z)),
+            status,
+            int(result.info.iter),
+        )

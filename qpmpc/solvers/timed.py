@@ -1,0 +1,119 @@
+"""What all tolerance-driven backends share: data update and solve, timed apart."""
+
+from abc import ABC, abstractmethod
+from importlib import import_module
+from time import perf_counter
+from types import ModuleType
+from typing import NamedTuple
+
+import numpy as np
+
+from qpmpc.errors import InputError
+from qpmpc.qp.stage_qp import QpData
+from qpmpc.qp.structure import QpStructure
+from qpmpc.solvers.base import Floats, QpSolution, Status, consistent, failed
+
+DEFAULT_TOLERANCE = 1e-8
+EXTRA = "verification"  # the extra of qpmpc-iptm that brings these solvers
+
+
+class Outcome(NamedTuple):
+    """What a backend returns of one solve."""
+
+    z: Floats
+    y: Floats
+    status: Status
+    iterations: int
+
+
+class TimedSolver(ABC):
+    """A backend that iterates until the KKT residuals are within a tolerance.
+
+    Parameters
+    ----------
+    tolerance : on primal and dual residual and duality gap, in solver units, as the solver
+        measures them
+
+    Raises
+    ------
+    InputError
+        If the solver's package is not installed, or the tolerance is not in (0, 1).
+    """
+
+    name: str
+    package: str
+
+    def __init__(self, tolerance: float = DEFAULT_TOLERANCE) -> None:
+        if not 0.0 < tolerance < 1.0:
+            raise InputError(f"solver tolerance must be between 0 and 1 (given: {tolerance})")
+        self.tolerance = tolerance
+        self.module = require(self.package, self.name)
+        self._structure: QpStructure | None = None
+
+    def setup(self, structure: QpStructure, data: QpData) -> None:
+        """Set up for the pattern of `structure`."""
+        self._structure = structure
+        self._start(structure, data)
+
+    def solve(
+        self, data: QpData, z: Floats | None, y: Floats | None, cold: bool = False
+    ) -> QpSolution:
+        """Update the values, then solve to the tolerance; `cold` makes no difference."""
+        if self._structure is None:
+            raise RuntimeError("setup must come before solve")
+        if not consistent(data):
+            return failed(data)
+        start = perf_counter()
+        if self._fits(data):
+            self._update(data)
+        else:
+            self._start(self._structure, data)
+        updated = perf_counter()
+        outcome = self._run(data, z, y)
+        done = perf_counter()
+        return QpSolution(
+            z=outcome.z,
+            y=outcome.y,
+            status=outcome.status,
+            iterations=outcome.iterations,
+            solve_s=done - updated,
+            update_s=updated - start,
+        )
+
+    @abstractmethod
+    def _start(self, structure: QpStructure, data: QpData) -> None:
+        """Set up from nothing."""
+
+    @abstractmethod
+    def _fits(self, data: QpData) -> bool:
+        """Whether the set-up can take these data by an update."""
+
+    @abstractmethod
+    def _update(self, data: QpData) -> None:
+        """Replace the values."""
+
+    @abstractmethod
+    def _run(self, data: QpData, z: Floats | None, y: Floats | None) -> Outcome:
+        """Solve what was set up last; `data` are the same once more."""
+
+
+def require(package: str, solver: str) -> ModuleType:
+    """Import a solver's package.
+
+    Raises
+    ------
+    InputError
+        If it is not installed; the message says what to install.
+    """
+    try:
+        return import_module(package)
+    except ImportError as error:
+        raise InputError(
+            f"solver {solver!r} needs the package {package!r}, which is not installed: "
+            f"pip install 'qpmpc-iptm[{EXTRA}]'"
+        ) from error
+
+
+def array(values: object) -> Floats:
+    """Copy what a solver returns: most reuse their memory in the next solve."""
+    return np.array(values, dtype=float)

@@ -1,0 +1,223 @@
+"""Every backend on the same problems, taken from closed loops."""
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from qpmpc.cycles import Cycle, load_cycle
+from qpmpc.errors import InputError
+from qpmpc.qp.stage_qp import QpData
+from qpmpc.solvers import Osqp, OsqpSettings, Status, make_solver, solver_names
+from qpmpc.vehicle import load_vehicle
+from qpmpc.verification.kkt import kkt_residuals, objective
+from qpmpc.verification.recorder import RecordedQp, Recording, record
+
+TOLERANCE = 1e-8
+NATIVE = tuple(name for name in solver_names() if name != "osqp")
+STALLING = ("highs", "proxqp")  # HiGHS cycles on some, ProxQP stops short of 1e-8 when cold
+OBJECTIVE = 1e-6  # solver units, in which the costliest variable costs 1 a unit
+
+
+def beginning(name: str, steps: int) -> Cycle:
+    whole = load_cycle(name)
+    inside = slice(steps + 1)
+    return Cycle(name, whole.time_s[inside], whole.speed_mps[inside], whole.grade[inside])
+
+
+@pytest.fixture(scope="module")
+def recordings() -> list[Recording]:
+    """City driving; a highway with coolant at its lower limit, so that its slack is in use."""
+    cold = load_vehicle().with_settings({"trip.t_cl_init_degc": 40.2})
+    return [
+        record(beginning("nycc", 150), load_vehicle()),
+        record(beginning("hwfet", 120), cold),
+    ]
+
+
+def chosen(recording: Recording) -> list[RecordedQp]:
+    """Departure (cold), some steps on the way, and arrival, where nearly all is masked."""
+    last = len(recording.qps) - 1
+    return [recording.qps[i] for i in (0, 10, last // 2, last - 12, last)]
+
+
+def infeasible(recording: Recording) -> QpData:
+    """Ask for more charge at the end than the trip allows."""
+    structure, data = recording.structure, recording.qps[20].data
+    row = (structure.stages - 1) * structure.rows.count + structure.rows.box_soc
+    lower, upper = data.lower.copy(), data.upper.copy()
+    upper[row] = 4.0 * upper[row]
+    lower[row] = 0.99 * upper[row]
+    return replace(data, lower=lower, upper=upper)
+
+
+@pytest.mark.parametrize("name", [*NATIVE, "qpsolvers:clarabel"])
+def test_optimum(name: str, recordings: list[Recording]) -> None:
+    solved = 0
+    for recording in recordings:
+        reference = make_solver("piqp", 1e-11)
+        solver = make_solver(name, TOLERANCE)
+        for backend in (reference, solver):
+            backend.setup(recording.structure, recording.qps[0].data)
+        for qp in chosen(recording):
+            best = reference.solve(qp.data, None, None)
+            found = solver.solve(qp.data, qp.z, qp.y)
+            if name == "highs" and not found.usable:
+                continue  # it cycles on some, and says so
+            solved += 1
+            assert found.status is Status.SOLVED
+            residuals = kkt_residuals(recording.structure, qp.data, found.z, found.y)
+            # z and slacks are of order 100: 1e-8 of a dual, or HiGHS's 1e-8 in P, come out as 1e-6
+            assert residuals.largest < 1e-5
+            assert objective(qp.data, found.z) == pytest.approx(
+                objective(qp.data, best.z), abs=OBJECTIVE * (1.0 + abs(objective(qp.data, best.z)))
+            )
+    assert solved >= 4
+
+
+@pytest.mark.parametrize("name", NATIVE)
+def test_unique_solution_is_found(name: str, recordings: list[Recording]) -> None:
+    """With a definite Hessian there is one z, and every backend finds it."""
+    recording = recordings[0]
+    data = recording.qps[50].data
+    definite = replace(data, hessian=data.hessian + 1.0)
+    solutions = []
+    for backend in (make_solver("piqp", 1e-11), make_solver(name, TOLERANCE)):
+        backend.setup(recording.structure, definite)
+        solutions.append(backend.solve(definite, None, None))
+    assert solutions[1].status is Status.SOLVED
+    # |z - z*|^2 <= 2 (J - J*) with curvature 1, and the gap is closed relative to |J|
+    gap = TOLERANCE * abs(objective(definite, solutions[0].z))
+    np.testing.assert_allclose(solutions[1].z, solutions[0].z, atol=np.sqrt(2.0 * gap), rtol=0.0)
+
+
+def test_osqp_converges_to_the_same_optimum(recordings: list[Recording]) -> None:
+    for recording in recordings:
+        reference = make_solver("piqp", 1e-11)
+        solver = Osqp(OsqpSettings(cold_iterations=40_000))
+        for backend in (reference, solver):
+            backend.setup(recording.structure, recording.qps[0].data)
+        for qp in chosen(recording):
+            best = objective(qp.data, reference.solve(qp.data, None, None).z)
+            found = solver.solve(qp.data, qp.z, qp.y, cold=True)
+            residuals = kkt_residuals(recording.structure, qp.data, found.z, found.y)
+            assert residuals.largest < 1e-3  # first order on a nearly linear problem: slow to end
+            assert objective(qp.data, found.z) == pytest.approx(best, abs=1e-3)
+
+
+@pytest.mark.parametrize("name", [*NATIVE, "qpsolvers:clarabel"])
+def test_infeasible_is_noticed_and_forgotten(name: str, recordings: list[Recording]) -> None:
+    recording = recordings[0]
+    data = recording.qps[20].data
+    solver = make_solver(name, TOLERANCE)
+    solver.setup(recording.structure, data)
+    before = solver.solve(data, None, None)
+    none = solver.solve(infeasible(recording), None, None)
+    after = solver.solve(data, None, None)
+    assert none.status is Status.INFEASIBLE
+    assert not none.usable
+    assert after.status is before.status
+    if before.usable:
+        assert objective(data, after.z) == pytest.approx(objective(data, before.z), abs=OBJECTIVE)
+
+
+def test_osqp_notices_infeasible_given_time(recordings: list[Recording]) -> None:
+    """With few iterations it cannot; the QP's own limits are always met by construction."""
+    recording = recordings[0]
+    data = infeasible(recording)
+    solver = Osqp(OsqpSettings(iterations=25, cold_iterations=4000))
+    solver.setup(recording.structure, data)
+    soon = solver.solve(data, None, None)
+    assert soon.status is Status.ITERATION_LIMIT
+    assert kkt_residuals(recording.structure, data, soon.z, soon.y).primal > 1.0
+    later = solver.solve(data, None, None, cold=True)
+    assert later.status is Status.INFEASIBLE
+    assert not later.usable
+
+
+@pytest.mark.parametrize("name", solver_names())
+def test_bad_data_is_refused(name: str, recordings: list[Recording]) -> None:
+    recording = recordings[0]
+    data = recording.qps[20].data
+    solver = make_solver(name)
+    solver.setup(recording.structure, data)
+    for bad in (
+        replace(data, q=np.full_like(data.q, np.nan)),
+        replace(data, lower=data.upper + 1.0),
+    ):
+        found = solver.solve(bad, None, None)
+        assert found.status is Status.FAILED
+        assert not found.usable
+
+
+@pytest.mark.parametrize("name", NATIVE)
+def test_update_equals_new_setup(name: str, recordings: list[Recording]) -> None:
+    """Values brought in by an update, equalities appearing, bounds vanishing: as if set up new."""
+    recording = recordings[0]
+    structure, first = recording.structure, recording.qps[40].data
+    second = recording.qps[90].data
+    row = (structure.stages - 1) * structure.rows.count + structure.rows.box_soc
+    fixed = second.lower.copy(), second.upper.copy()
+    fixed[1][row] = fixed[0][row]
+    open_end = second.upper.copy()
+    open_end[row] = np.inf
+    solver = make_solver(name, TOLERANCE)
+    solver.setup(structure, first)
+    solver.solve(first, None, None)
+    for data in (
+        second,
+        replace(second, lower=fixed[0], upper=fixed[1]),
+        replace(second, upper=open_end),
+        first,
+    ):
+        fresh = make_solver(name, TOLERANCE)
+        fresh.setup(structure, data)
+        a, b = solver.solve(data, None, None), fresh.solve(data, None, None)
+        if name in STALLING and Status.SOLVED not in (a.status, b.status):
+            continue
+        assert a.status is b.status is Status.SOLVED
+        assert objective(data, a.z) == pytest.approx(objective(data, b.z), abs=OBJECTIVE)
+
+
+def test_arrays_given_are_not_changed(recordings: list[Recording]) -> None:
+    recording = recordings[0]
+    qp = recording.qps[30]
+    assert qp.z is not None
+    assert qp.y is not None
+    kept = [a.copy() for a in (qp.data.q, qp.data.a_data, qp.data.lower, qp.data.upper, qp.z, qp.y)]
+    for name in solver_names():
+        solver = make_solver(name)
+        solver.setup(recording.structure, qp.data)
+        first = solver.solve(qp.data, qp.z, qp.y)
+        z = first.z.copy()
+        solver.solve(recording.qps[60].data, None, None)
+        np.testing.assert_array_equal(first.z, z)
+    now = (qp.data.q, qp.data.a_data, qp.data.lower, qp.data.upper, qp.z, qp.y)
+    for before, after in zip(kept, now, strict=True):
+        np.testing.assert_array_equal(before, after)
+
+
+def test_times_are_apart(recordings: list[Recording]) -> None:
+    for name in solver_names():
+        solver = make_solver(name)
+        solver.setup(recordings[0].structure, recordings[0].qps[5].data)
+        found = solver.solve(recordings[0].qps[6].data, None, None)
+        assert found.solve_s > 0.0
+        assert found.update_s > 0.0
+
+
+def test_unknown_names() -> None:
+    with pytest.raises(InputError, match=r"unknown solver 'gurobi'.*osqp.*piqp"):
+        make_solver("gurobi")
+    with pytest.raises(InputError, match="qpsolvers finds no solver 'nonsense'"):
+        make_solver("qpsolvers:nonsense")
+    with pytest.raises(InputError, match="tolerance"):
+        make_solver("piqp", 0.0)
+
+
+def test_missing_package_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "scs", None)
+    with pytest.raises(InputError, match=r"pip install 'qpmpc-iptm\[verification\]'") as error:
+        make_solver("scs")
+    assert "\n" not in str(error.value)
