@@ -19,9 +19,7 @@ def soc_drift(plant: Plant, truth: Trace, settings: RuleBasedSettings) -> float:
     for t, (demand_w, speed_mps) in enumerate(
         zip(truth.demand_w.tolist(), truth.speed_mps.tolist(), strict=True)
     ):
-        seen = Observation(
-            t, state.soc, state.t_cl_degc, state.engine_on, demand_w, speed_mps
-        )
+        seen = Observation(t, state.soc, state.t_cl_degc, state.engine_on, demand_w, speed_mps)
         state, _ = plant.step(state, rules.decide(seen).command, demand_w, speed_mps)
     return state.soc - plant.vehicle.trip.soc_init
 

@@ -22,7 +22,13 @@ PLAN_VALID_STEPS = 3  # how many steps an old plan may drive before the rules ta
 
 
 class MhQpSettings(BaseModel):
-    """Everything that shapes the controller; dotted names such as `mh_qp.osqp.iterations`."""
+    """Everything that shapes the controller; dotted names such as `mh_qp.osqp.iterations`.
+
+    Attributes
+    ----------
+    prepared : solve the first QP before the trip starts; if not, the rules drive the first steps
+        while the solver warms up
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -31,6 +37,7 @@ class MhQpSettings(BaseModel):
     qp: QpSettings = QpSettings()
     scaling: ScalingSettings = ScalingSettings()
     osqp: OsqpSettings = OsqpSettings()
+    prepared: bool = True
 
 
 class MhQp:
@@ -70,6 +77,8 @@ class MhQp:
         self._rules = RuleBased(plant, rules)
         self._old_plan: Plan | None = None
         self._old_plan_step = 0
+        if settings.prepared:
+            self.planner.prepare(0, vehicle.trip.soc_init, vehicle.trip.t_cl_init_degc)
 
     def decide(self, seen: Observation) -> Decision:
         """Run one step: QP, else the shifted last plan, else the rules; safety layer in any case.
@@ -79,18 +88,22 @@ class MhQp:
         ruled = self._rules.decide(seen)
         plan = self.planner.solve(seen.step, seen.soc, seen.t_cl_degc)
         iterations = plan.solution.iterations
-        if plan.solution.usable:
+        if plan.solution.usable and self.planner.ready:
             self._old_plan, self._old_plan_step = plan, seen.step
             command = self._safety.admissible(self._realise(plan, 0), seen)
             gap, sigma = self._relaxation_gap(plan), float(plan.x[0, Var.ON])
             return Decision(command, "", iterations, gap, sigma)
-        self.planner.forget()
         age = seen.step - self._old_plan_step
         short = self.planner.preview.settings.short_stages
         if self._old_plan is not None and age < min(PLAN_VALID_STEPS + 1, short):
             command = self._safety.admissible(self._realise(self._old_plan, age), seen)
             return Decision(command, "shifted plan", iterations)
         return Decision(ruled.command, "rule-based", iterations)
+
+    def reset(self) -> None:
+        """Forget plan and warm start, as after a restart of the ECU on the road."""
+        self.planner.reset()
+        self._old_plan = None
 
     @staticmethod
     def _realise(plan: Plan, stage: int) -> Command:

@@ -15,6 +15,7 @@ Floats = NDArray[np.float64]
 COLDEST_DEGC, HOTTEST_DEGC = 0.0, 100.0  # where a linearisation point may lie
 DEPARTURE_LINEARISATIONS = 5
 DEPARTURE_FUEL_G_PER_S = 0.3
+WARM_UP_STEPS = 5  # of K iterations; measured: fewer gain nothing, more leave the rules driving
 
 
 @dataclass(frozen=True)
@@ -36,50 +37,80 @@ class Plan:
 
 
 class Planner:
-    """Solves the trip's QP step after step.
+    """Solves the trip's QP step after step, each in the same fixed time.
+
+    A QP this close to a linear program needs some thousand iterations from cold. `prepare` spends
+    them before the trip starts, when time does not matter. Without it, or after a reset on the
+    road, every step spends the same K iterations from the last one's result, and `ready` stays
+    false for `WARM_UP_STEPS` steps, in which something else has to drive.
 
     Parameters
     ----------
     preview : cuts the trip into stages
     qp : values of the QP
     solver : backend
+
+    Attributes
+    ----------
+    plan : last usable solution, None after a reset
+    ready : whether the plan may be acted on
     """
 
     def __init__(self, preview: StageBuilder, qp: StageQp, solver: QpSolver) -> None:
         self.preview, self.qp, self.solver = preview, qp, solver
         self.plan: Plan | None = None
         self.data: QpData | None = None
+        self._plan_step = 0
+        self._solves = 0
         self._is_set_up = False
         self._shift = preview.shift()
 
-    def solve(self, step: int, soc: float, t_cl_degc: float) -> Plan:
-        """Solve the QP of time step `step`; consecutive steps are warm-started.
+    @property
+    def ready(self) -> bool:
+        """Whether enough iterations have been spent since the last reset."""
+        return self._solves >= WARM_UP_STEPS
 
-        The first solve, and one after `forget`, is cold: several linearisations in turn.
-        """
+    def prepare(self, step: int, soc: float, t_cl_degc: float) -> None:
+        """Solve the QP of time step `step` from cold, with several linearisations, to the end."""
         stages = self.preview.at(step)
-        if self.plan is None:
-            return self._depart(stages, soc, t_cl_degc)
-        x, duals = self.plan.x[self._shift], self.plan.duals[self._shift]
-        about = self._linearisation(x, t_cl_degc)
-        self.plan = self._solve(stages, soc, t_cl_degc, about, (x, duals))
-        return self.plan
-
-    def forget(self) -> None:
-        """Drop the last solution: the next solve is cold."""
-        self.plan = None
-
-    def _depart(self, stages: Stages, soc: float, t_cl_degc: float) -> Plan:
-        n = len(stages.duration_s)
-        about = Linearisation(np.full(n, t_cl_degc), np.full(n, DEPARTURE_FUEL_G_PER_S))
-        start: tuple[Floats, Floats] | None = None
+        about, start = self._cold_start(stages, t_cl_degc)
         for _ in range(DEPARTURE_LINEARISATIONS):
             plan = self._solve(stages, soc, t_cl_degc, about, start, cold=True)
             if not plan.solution.usable:
-                return plan
+                return
             about, start = self._linearisation(plan.x, t_cl_degc), (plan.x, plan.duals)
-        self.plan = plan
+        self.plan, self._plan_step, self._solves = plan, step, WARM_UP_STEPS
+
+    def solve(self, step: int, soc: float, t_cl_degc: float) -> Plan:
+        """Spend one step's iterations on the QP of time step `step`.
+
+        They start from the last usable plan, shifted by as many steps as have passed, or from
+        nothing after a reset. An unusable result leaves that plan in place.
+        """
+        stages = self.preview.at(step)
+        if self.plan is None:
+            about, start = self._cold_start(stages, t_cl_degc)
+        else:
+            x, duals = self.plan.x, self.plan.duals
+            for _ in range(step - self._plan_step):
+                x, duals = x[self._shift], duals[self._shift]
+            about, start = self._linearisation(x, t_cl_degc), (x, duals)
+        plan = self._solve(stages, soc, t_cl_degc, about, start)
+        if plan.solution.usable:
+            self.plan, self._plan_step = plan, step
+            self._solves += 1
         return plan
+
+    def reset(self) -> None:
+        """Forget the last solution, as after a restart of the controller on the road."""
+        self.plan, self._solves = None, 0
+
+    @staticmethod
+    def _cold_start(
+        stages: Stages, t_cl_degc: float
+    ) -> tuple[Linearisation, tuple[Floats, Floats] | None]:
+        n = len(stages.duration_s)
+        return Linearisation(np.full(n, t_cl_degc), np.full(n, DEPARTURE_FUEL_G_PER_S)), None
 
     def _solve(
         self,
