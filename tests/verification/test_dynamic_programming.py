@@ -32,6 +32,7 @@ VEHICLE = load_vehicle()
 PLANT = Plant(VEHICLE)
 MAPS = build_problem(load_cycle("nycc"), VEHICLE).maps
 COARSE = DpSettings(soc_step=0.004, t_cl_step_k=1.0, power_step_w=1000.0, refinement=2, threads=1)
+QUICK = DpSettings.quick().model_copy(update={"threads": 1})
 # for a drive of seconds, where a cell is a large part of the energy
 FINE = DpSettings(power_step_w=250.0, refinement=16, tube_soc=0.02, tube_t_cl_k=1.0, threads=1)
 ROUNDING = 1e-9
@@ -193,7 +194,7 @@ def test_exhaustive_search_finds_nothing_better(settings_: dict[str, object]) ->
 
 @pytest.fixture(scope="module")
 def urban_solution() -> DpSolution:
-    return solve_dp(urban(), VEHICLE, COARSE, use_cache=False)
+    return solve_dp(urban(), VEHICLE, QUICK, use_cache=False)
 
 
 @pytest.mark.parametrize("threshold_w", [0.0, 2e3, 4e3, 6e3, 8e3, 12e3])
@@ -312,11 +313,11 @@ def test_demand_beyond_the_car_is_reported() -> None:
 def test_costates_are_slopes_of_fuel(urban_solution: DpSolution) -> None:
     """lambda_T(0) is the central difference of optimal fuel over the initial temperature."""
     below, above = (
-        solve_dp(urban(), with_settings(trip__t_cl_init_degc=50.0 + d), COARSE).fuel_total_g
+        solve_dp(urban(), with_settings(trip__t_cl_init_degc=50.0 + d), QUICK).fuel_total_g
         for d in (-2.0, 2.0)
     )
     slope = (below - above) / 4.0
-    assert urban_solution.t_cl_costate_g_per_k[0] == pytest.approx(slope, rel=0.05)
+    assert urban_solution.t_cl_costate_g_per_k[0] == pytest.approx(slope, rel=0.02)
 
 
 def test_costates_have_signs_and_sizes_of_prices(urban_solution: DpSolution) -> None:

@@ -70,19 +70,10 @@ class Axis:
 
 @dataclass(frozen=True)
 class Grid:
-    """SOC and coolant axes, slopes of the value beyond them, spacing of the engine power.
-
-    Attributes
-    ----------
-    soc, t_cl : axes
-    soc_price_g, t_cl_price_g_per_k : fuel saved by a unit more, at the times 0..n, shape (n+1,)
-    power_step_w : spacing of the engine power
-    """
+    """SOC and coolant axes, and the spacing of the engine power."""
 
     soc: Axis
     t_cl: Axis
-    soc_price_g: Floats
-    t_cl_price_g_per_k: Floats
     power_step_w: float
 
     @classmethod
@@ -94,8 +85,6 @@ class Grid:
         return cls(
             Axis.full(maps.soc_min, maps.soc_max, soc_step, times),
             Axis.full(maps.t_cl_min_degc, maps.t_cl_max_degc, t_cl_step_k, times),
-            np.zeros(times),
-            np.zeros(times),
             power_step_w,
         )
 
@@ -115,8 +104,6 @@ class Grid:
             Axis.around(
                 path.t_cl_degc, half_width[1], maps.t_cl_min_degc, maps.t_cl_max_degc, step[1]
             ),
-            np.append(path.soc_costate_g, 0.0),
-            np.append(path.t_cl_costate_g_per_k, 0.0),
             power_step_w,
         )
 
@@ -131,15 +118,8 @@ class Grid:
         return self.soc.points * self.t_cl.points
 
     def lattice(self, k: int) -> Lattice:
-        """Place, cells and outer slopes at time k."""
-        return Lattice(
-            self.soc.origin(k),
-            self.soc.spacing,
-            self.t_cl.origin(k),
-            self.t_cl.spacing,
-            float(self.soc_price_g[k]),
-            float(self.t_cl_price_g_per_k[k]),
-        )
+        """Corner and cell size at time k."""
+        return Lattice(self.soc.origin(k), self.soc.spacing, self.t_cl.origin(k), self.t_cl.spacing)
 
     def power_count(self, problem: Problem, k: int) -> int:
         """Number of engine powers tried in step k, both ends of the range included."""

@@ -18,6 +18,7 @@ Cells = NDArray[np.uint32]
 
 INF = np.inf
 ONE = np.uint32(1)
+EDGE = 1e-9  # tolerance at the edge of a grid, in cells
 MARGIN = 1e-9  # kept from the limits, so that rounding cannot cross them
 ROUNDING = 1e-14  # at SOC_max, where the brakes hold the battery exactly
 BISECTIONS = 60
@@ -64,18 +65,12 @@ class Maps(NamedTuple):
 
 
 class Lattice(NamedTuple):
-    """Where a grid lies: node (i, j) is at origin + (i, j) * spacing.
-
-    Beyond its edges the value function continues with the slopes -soc_price_g per unit of SOC and
-    -t_cl_price_g_per_k.
-    """
+    """Where a grid lies: node (i, j) is at origin + (i, j) * spacing."""
 
     soc_origin: float
     soc_spacing: float
     t_cl_origin: float
     t_cl_spacing: float
-    soc_price_g: float
-    t_cl_price_g_per_k: float
 
 
 class Step(NamedTuple):
@@ -304,9 +299,9 @@ def cell(position: float, points: int) -> tuple[int, float]:
 
 
 @compiled
-def beyond(position: float, points: int) -> float:
-    """Distance by which a position exceeds an axis, negative below it, in cells."""
-    return position - min(max(position, 0.0), points - 1.0)
+def outside(position: float, points: int) -> bool:
+    """Tell whether a position lies off an axis."""
+    return position < -EDGE or position > points - 1.0 + EDGE
 
 
 @compiled
@@ -329,30 +324,7 @@ def gradient(value: Floats, row: float, column: float) -> tuple[float, float]:
     return rise / (high - low), run / (right - left)
 
 
-@compiled
-def extended(value: Floats, target: Lattice, soc: float, t_cl: float) -> float:
-    """Value at any state: interpolated on the grid, linear beyond it."""
-    row = (soc - target.soc_origin) / target.soc_spacing
-    column = (t_cl - target.t_cl_origin) / target.t_cl_spacing
-    soc_excess = beyond(row, value.shape[0]) * target.soc_spacing
-    t_excess = beyond(column, value.shape[1]) * target.t_cl_spacing
-    outer = target.soc_price_g * soc_excess + target.t_cl_price_g_per_k * t_excess
-    return interpolate(value, row, column) - outer
-
-
 # the Bellman step
-
-
-@compiled
-def soc_allowed(maps: Maps, soc: float) -> bool:
-    """Tell whether SOC is within its limits."""
-    return maps.soc_min + MARGIN <= soc <= maps.soc_max + ROUNDING
-
-
-@compiled
-def t_cl_allowed(maps: Maps, t_cl: float) -> bool:
-    """Tell whether the coolant is within its limits."""
-    return maps.t_cl_min_degc + MARGIN <= t_cl <= maps.t_cl_max_degc - MARGIN
 
 
 @compiled
@@ -376,23 +348,34 @@ def command_cost(
 ) -> float:
     """Fuel of one command plus W_{k+1} where it leads.
 
-    Breaking a limit costs infinity if `strict`, else a penalty on the distance.
+    Leaving limits or grid costs infinity if `strict`, else a penalty on the distance.
     """
     soc, t_cl = state
+    states, rows, columns = following.shape
     fuel = alpha(maps, t_cl) * hot_fuel_g(maps, power) + start_g if on else 0.0
     t_end = next_t_cl(maps, t_cl, fuel, power, losses_w(maps, t_cl, step.speed_mps))
     soc_end = next_soc(maps, soc, step.demand_w, power)
-    cost = fuel
-    if not (soc_allowed(maps, soc_end) and t_cl_allowed(maps, t_end)):
-        if strict:
+    row = (soc_end - target.soc_origin) / target.soc_spacing
+    column = (t_end - target.t_cl_origin) / target.t_cl_spacing
+    if strict:
+        if (
+            outside(row, rows)
+            or outside(column, columns)
+            or not maps.soc_min + MARGIN <= soc_end <= maps.soc_max + ROUNDING
+            or not maps.t_cl_min_degc + MARGIN <= t_end <= maps.t_cl_max_degc - MARGIN
+        ):
             return INF
-        t_excess = max(maps.t_cl_min_degc - t_end, t_end - maps.t_cl_max_degc, 0.0)
-        soc_excess = max(maps.soc_min - soc_end, soc_end - maps.soc_max, 0.0)
-        cost += maps.soc_penalty_g * soc_excess + maps.t_cl_penalty_g_per_k * t_excess
+        penalty = 0.0
+    else:
+        soc_low = step.coast_soc if step.last else target.soc_origin
+        soc_high = target.soc_origin + (rows - 1) * target.soc_spacing
+        t_high = target.t_cl_origin + (columns - 1) * target.t_cl_spacing
+        penalty = maps.soc_penalty_g * max(soc_low - soc_end, soc_end - soc_high, 0.0)
+        penalty += maps.t_cl_penalty_g_per_k * max(target.t_cl_origin - t_end, t_end - t_high, 0.0)
     if step.last:
-        return cost + maps.soc_penalty_g * max(step.coast_soc - soc_end, 0.0)
-    after = 1 if on and following.shape[0] == 2 else 0
-    return cost + extended(following[after], target, soc_end, t_end)
+        return fuel + penalty
+    after = 1 if on and states == 2 else 0
+    return fuel + penalty + interpolate(following[after], row, column)
 
 
 @compiled
@@ -404,7 +387,7 @@ def least_penalised(
     following: Floats,
     target: Lattice,
 ) -> tuple[float, bool, float]:
-    """Return cost, on or off, and power of the command that breaks limits by the least."""
+    """Return cost, on or off, and power of the command that leaves the grid by the least."""
     best, best_on, best_power = INF, False, 0.0
     if step.off_allowed:
         best = command_cost(maps, step, state, start_g, False, 0.0, following, target, False)
@@ -430,10 +413,9 @@ def temperature_tables(
 ) -> None:
     """Fill fuel and next T, as cell and weight, for all engine states e, inputs u, temperatures j.
 
-    Input u = 0 is off, u >= 1 power u - 1 of `grid_power_w`. Shapes (2 or 1, count+1, nt). To
-    the fuel is added what the value changes from the edge of the grid to a next T beyond it; it
-    is infinite where the next T breaks a limit. Two engine states exist only with a start cost:
-    e = 0, off before, and e = 1, on before.
+    Input u = 0 is off, u >= 1 power u - 1 of `grid_power_w`. Shapes (2 or 1, count+1, nt); fuel
+    is infinite where the next T leaves the grid of `columns` nodes. Two engine states exist only
+    with a start cost: e = 0, off before, and e = 1, on before.
     """
     states, nt = fuel.shape[0], len(t_axis)
     factor, losses = np.empty(nt), np.empty(nt)
@@ -449,17 +431,15 @@ def temperature_tables(
                 used = factor[j] * hot + start_g
                 end = next_t_cl(maps, t_axis[j], used, power, losses[j])
                 position = (end - target.t_cl_origin) / target.t_cl_spacing
-                outer = beyond(position, columns) * target.t_cl_spacing
-                used -= target.t_cl_price_g_per_k * outer
-                fuel[e, u, j] = used if t_cl_allowed(maps, end) else INF
+                fuel[e, u, j] = INF if outside(position, columns) else used
                 column[e, u, j], weight[e, u, j] = cell(position, columns)
 
 
 @compiled
-def mix(lower: Floats, upper: Floats, share: float, outer: float, result: Floats) -> None:
-    """Interpolate between two rows: result = (1 - share) lower + share upper - outer."""
+def mix(lower: Floats, upper: Floats, share: float, result: Floats) -> None:
+    """Interpolate between two rows: result = (1 - share) lower + share upper."""
     for j in range(len(result)):
-        result[j] = (1.0 - share) * lower[j] + share * upper[j] - outer
+        result[j] = (1.0 - share) * lower[j] + share * upper[j]
 
 
 @compiled
@@ -492,7 +472,7 @@ def bellman_rows(
                      min_P alpha f(P) + start + W_{k+1}(x'_P, 1),
                      min_P alpha f(P) + start   over x'_P in the coasting set of k+1 }
 
-    over inputs that keep x' within the limits; where none does, the least penalised one.
+    over inputs that keep x' on the grid of k+1; where none does, the least penalised one.
     `following` and `value` are W_{k+1} and W_k, shape (2 or 1, ns, nt).
     """
     states, rows, columns = following.shape
@@ -507,12 +487,11 @@ def bellman_rows(
             after = 1 if u > 0 and states == 2 else 0
             for i in range(begin, end):
                 soc = next_soc(maps, soc_axis[i], step.demand_w, power)
-                if not soc_allowed(maps, soc):
-                    continue
                 position = (soc - target.soc_origin) / target.soc_spacing
+                if outside(position, rows):
+                    continue
                 lower, share = cell(position, rows)
-                outer = target.soc_price_g * beyond(position, rows) * target.soc_spacing
-                mix(following[after, lower], following[after, lower + 1], share, outer, mixed)
+                mix(following[after, lower], following[after, lower + 1], share, mixed)
                 for e in range(states):
                     improve(value[e, i], fuel[e, u], column[e, u], weight[e, u], mixed)
     for e in range(states):

@@ -9,7 +9,7 @@ from qpmpc.errors import InputError
 from qpmpc.vehicle import Plant, Vehicle, demand_w
 from qpmpc.verification.dynamic_programming.kernels import Bools, Floats, Maps
 
-PENALTY_FACTOR = 10.0  # on the price of an infeasible SOC or T, in fuel that would restore it
+PENALTY_FACTOR = 30.0  # on the price of an infeasible SOC or T, in fuel that would restore it
 
 
 @dataclass(frozen=True)
