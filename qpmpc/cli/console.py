@@ -16,6 +16,14 @@ from qpmpc.simulate import Progress as Report
 UNLIMITED_WIDTH = 1000
 
 
+class _Console(Console):
+    """Console that leaves it to `main` what a reader's early departure means."""
+
+    def on_broken_pipe(self) -> None:
+        """Say so, where rich would exit with code 1."""
+        raise BrokenPipeError
+
+
 def result_console(json_file: Path | None = None) -> Console:
     """Console for results: stdout, but stderr when stdout is for JSON.
 
@@ -23,7 +31,7 @@ def result_console(json_file: Path | None = None) -> Console:
     """
     file = sys.stderr if json_file == STDOUT else sys.stdout
     width = None if file.isatty() else UNLIMITED_WIDTH
-    return Console(file=file, width=width, highlight=False, soft_wrap=not file.isatty())
+    return _Console(file=file, width=width, highlight=False, soft_wrap=not file.isatty())
 
 
 def write_json(data: Any, json_file: Path | None) -> None:

@@ -1,0 +1,173 @@
+"""Exit codes, and errors as one line that leave nothing behind."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import qpmpc.runners
+from qpmpc.cli import main
+
+
+def assert_refused(done, *words):
+    assert done.code == 2
+    assert done.out == ""
+    assert done.err.startswith("qpmpc: ")
+    assert done.err.count("\n") == 1
+    assert done.err.endswith("\n")
+    for word in words:
+        assert word in done.err
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {str(f): f.read_bytes() for f in folder.rglob("*") if f.is_file()}
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        ([], ["command"]),
+        (["nonsense"], ["nonsense", "--help"]),
+        (["simulate"], ["CYCLE", "qpmpc simulate --help"]),
+        (["simulate", "nycc", "--nonsense"], ["--nonsense"]),
+        (["simulate", "nycc", "extra"], ["extra"]),
+        (["simulate", "nonsense"], ["nonsense", "nycc", "CSV"]),
+        (["simulate", "missing.csv"], ["missing.csv"]),
+        (["simulate", "nycc", "--controller", "pid"], ["pid", "mh-qp", "rule-based", "dp"]),
+        (["simulate", "nycc", "--vehicle", "beetle"], ["beetle", "prius-nimh"]),
+        (["simulate", "nycc", "--vehicle", "missing.toml"], ["missing.toml"]),
+        (["simulate", "nycc", "--set", "x"], ["KEY=VALUE"]),
+        (["simulate", "nycc", "--set", "x.y=1"], ["x.y", "thermal", "mh_qp"]),
+        (["simulate", "nycc", "--set", "thermal.t_ambient=1"], ["t_ambient", "t_amb_degc"]),
+        (["simulate", "nycc", "--set", "thermal.t_amb_degc=warm"], ["t_amb_degc", "warm"]),
+        (["simulate", "nycc", "--set", "trip.soc_init=0.9"], ["soc_init"]),
+        (["simulate", "nycc", "--set", "mh_qp.osqp.iterations=0"], ["iterations"]),
+        (["simulate", "nycc", "--set", "mh_qp.osqp.iteration=9"], ["iteration", "iterations"]),
+        (["simulate", "nycc", "--json", "."], ["--json", "directory"]),
+        (["simulate", "nycc", "--json", "file/run.json"], ["--json", "file"]),
+        (["simulate", "nycc", "--out", "file"], ["--out", "file"]),
+        (["simulate", "nycc", "--out", "file/deeper"], ["--out", "file"]),
+        (["compare"], ["CYCLE"]),
+        (["compare", "nycc", "nonsense"], ["nonsense"]),
+        (["compare", "nycc", "nycc"], ["nycc", "twice"]),
+        (["compare", "nycc", "--controllers", "mh-qp,mh-qp"], ["mh-qp", "twice"]),
+        (["compare", "nycc", "--controllers", "mh-qp,"], ["''", "rule-based"]),
+        (["compare", "nycc", "--out", "file"], ["--out", "file"]),
+        (["cycles", "nonsense"], ["nonsense", "nycc"]),
+        (["cycles", "--out", "."], ["--out", "name"]),
+        (["vehicles", "nonsense"], ["nonsense", "prius-nimh"]),
+        (["vehicles", "nycc", "--out", "file"], ["file"]),
+    ],
+)
+def test_bad_input_is_one_line_and_nothing_is_written(cli, tmp_path, monkeypatch, args, words):
+    def no_run(*_):
+        raise AssertionError("bad input must be found before any run")
+
+    monkeypatch.setattr(qpmpc.runners, "run", no_run)
+    monkeypatch.chdir(tmp_path)
+    Path("file").write_text("not a folder")
+    before = files(tmp_path)
+    assert_refused(cli(*args), *words)
+    assert files(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    "rows",
+    ["", "time,speed\n0,0\n", "time_s,speed_mps\n0,0\n1,x\n", "time_s,speed_mps\n0,-1\n1,0\n"],
+)
+def test_bad_trip(cli, tmp_path, rows):
+    file = tmp_path / "trip.csv"
+    file.write_text(rows)
+    assert_refused(cli("simulate", file, "--out", tmp_path / "out"), "trip.csv")
+    assert not (tmp_path / "out").exists()
+
+
+def test_bad_vehicle_file(cli, trip, tmp_path):
+    file = tmp_path / "car.toml"
+    file.write_text("name = 'x'\n")
+    assert_refused(cli("simulate", trip, "--vehicle", file), "car.toml", "chassis")
+    file.write_text("name = = 'x'\n")
+    assert_refused(cli("simulate", trip, "--vehicle", file), "car.toml", "TOML")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_folder_without_permission(cli, trip, tmp_path):
+    folder = tmp_path / "locked"
+    folder.mkdir(mode=0o500)
+    assert_refused(cli("simulate", trip, "--out", folder / "results"), "permission")
+
+
+def test_missing_package_is_found_before_any_run(cli, trip, monkeypatch):
+    monkeypatch.setitem(sys.modules, "numba", None)
+    done = cli("compare", trip, "--controllers", "mh-qp,dp")
+    assert_refused(done, "dp", "numba", "qpmpc-iptm[verification]")
+
+
+def test_anything_else_is_one_line_and_exit_code_1(cli, trip, tmp_path, monkeypatch):
+    def broken(*_):
+        raise RuntimeError("the first line\nand the second")
+
+    monkeypatch.setattr(qpmpc.runners, "run", broken)
+    done = cli("simulate", trip, "--out", tmp_path / "out")
+    assert (done.code, done.out) == (1, "")
+    assert done.err.count("\n") == 1
+    assert "RuntimeError: the first line and the second" in done.err
+    assert not (tmp_path / "out").exists()
+    monkeypatch.setenv("QPMPC_DEBUG", "1")
+    with pytest.raises(RuntimeError):
+        main(["simulate", str(trip)])
+
+
+def test_full_disk_leaves_no_part_of_a_file(cli, trip, tmp_path, monkeypatch):
+    def full(path, content):
+        with path.open("wb") as file:
+            file.write(content[:10])
+        raise OSError(28, "No space left on device", str(path))
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    done = cli("simulate", trip, "--json", tmp_path / "run.json")
+    assert done.code == 1
+    assert "No space left" in done.err
+    assert list(tmp_path.iterdir()) == [trip]
+
+
+def test_interrupt(cli, trip, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(qpmpc.runners, "run", interrupted)
+    done = cli("simulate", trip)
+    assert done.code == 130
+    assert done.err == "qpmpc: interrupted\n"
+
+
+def test_interrupt_reaches_a_run_that_spends_its_time_in_the_solver(tmp_path):
+    """OSQP catches the signal itself and would swallow it."""
+    script = (
+        "import os, signal, threading\n"
+        "from qpmpc.cli import main\n"
+        "threading.Timer(2.0, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
+        "main(['simulate', 'wltc-3b', '--set', 'mh_qp.osqp.iterations=5000'])\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path
+    )
+    assert done.returncode == 130
+    assert done.stderr == "qpmpc: interrupted\n"
+
+
+def test_reader_that_leaves_is_no_error(tmp_path):
+    """As in `qpmpc vehicles NAME | head -1`."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "qpmpc", "vehicles", "prius-nimh"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        cwd=tmp_path,
+    )
+    assert process.stdout is not None
+    process.stdout.close()
+    _, err = process.communicate()
+    assert err == b""
+    assert process.returncode == 0
