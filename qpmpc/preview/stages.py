@@ -36,6 +36,11 @@ class StageBuilder:
     or that the short horizon covers, has duration 0. So a long stage keeps its slot, which is
     what lets primal and dual variables be carried from step to step by identity.
 
+    The forecast is read at the time since departure and may be wrong about the trip's length. A
+    trip that outlasts it goes on with the short horizon alone, to whose end the terminal band
+    then applies; a trip that ends before it is planned to its end as soon as the short horizon
+    sees the arrival, and what the forecast still holds is masked.
+
     Parameters
     ----------
     vehicle : parameters
@@ -66,7 +71,9 @@ class StageBuilder:
         fields[0, :seen] = 1.0
         fields[1, :seen] = self._short_net_w[step : step + seen]
         fields[2, :seen] = self._short_speed_mps[step : step + seen]
+        arriving = step + n_short >= self.steps
         start = np.clip(step + seen, self._block_start, self._block_end)
+        start = self._block_end if arriving else start
         # (classes, 3, blocks) -> fields of the long stages, block by block, class by class
         sums = self._cumulative[:, :, self._block_end] - self._cumulative[:, :, start]
         duration = sums[:, 0].T.ravel()

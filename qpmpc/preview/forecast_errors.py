@@ -1,0 +1,146 @@
+"""Forecasts that are wrong: seeded error models of what is known of the road beyond the window.
+
+Each model turns the true trip into another one, as a `Cycle`; `forecast` makes the demand and
+speed `Trace` of it that the long horizon sees. The short horizon always sees the truth.
+"""
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from qpmpc.cycles import Cycle
+from qpmpc.errors import InputError
+from qpmpc.preview.forecast import Trace
+from qpmpc.vehicle.parameters import Vehicle
+
+Floats = NDArray[np.float64]
+Model = Callable[[Cycle, np.random.Generator], Cycle]
+
+NOISE_SHARE, NOISE_CORRELATION_S = 0.15, 20.0
+STRETCH_SHARE = 0.05
+SHIFT_S = 10.0
+STOP_SPREAD = 0.5
+BURN_IN = 10  # correlation times after which the noise has forgotten how it began
+
+
+def speed_noise(cycle: Cycle, rng: np.random.Generator) -> Cycle:
+    """Speed off by a correlated share: v' = v (1 + n), not below 0.
+
+    n is Gaussian with standard deviation 0.15 and the autocorrelation (1 + t/c) exp(-t/c), whose
+    integral, the correlation time, is 2 c = 20 s. That is AR(1) noise smoothed once more: plain
+    AR(1) noise of speed is rough, and its accelerations (1.4 m/s^2 rms at 30 m/s) would be those
+    of no driver. Stops stay stops.
+    """
+    pole = float(np.exp(-2.0 / NOISE_CORRELATION_S))
+    burn_in = int(BURN_IN * NOISE_CORRELATION_S)
+    white = rng.standard_normal(burn_in + len(cycle.speed_mps))
+    smooth = lfilter([1.0], [1.0, -2.0 * pole, pole * pole], white)[burn_in:]
+    deviation = np.sqrt((1.0 + pole**2) / (1.0 - pole**2) ** 3)  # of the filter's output
+    factor = np.maximum(1.0 + NOISE_SHARE * smooth / deviation, 0.0)
+    return Cycle(cycle.name, cycle.time_s, cycle.speed_mps * factor, cycle.grade)
+
+
+def travel_time_stretch(cycle: Cycle, rng: np.random.Generator) -> Cycle:
+    """The whole trip slower or faster: t' = f t, v' = v / f, f lognormal with 5 %; same distance.
+
+    The last second is cut or filled up to a whole one.
+    """
+    factor = float(np.exp(STRETCH_SHARE * rng.standard_normal()))
+    steps = max(round(cycle.steps * factor), 1)
+    time_s = np.arange(steps + 1.0)
+    speed = np.interp(time_s / factor, cycle.time_s, cycle.speed_mps) / factor
+    grade = np.interp(time_s / factor, cycle.time_s, cycle.grade)
+    return Cycle(cycle.name, time_s, speed, grade)
+
+
+def shift(cycle: Cycle, rng: np.random.Generator) -> Cycle:
+    """Everything later or earlier by some seconds, normal with 10 s.
+
+    Late, the trip begins with a wait at its first speed; early, its first seconds are missing.
+    """
+    most = cycle.steps // 2
+    late = int(np.clip(round(SHIFT_S * rng.standard_normal()), -most, most))
+    index = np.maximum(np.arange(len(cycle.time_s) + late) - max(late, 0), 0) + max(-late, 0)
+    return _at(cycle, index)
+
+
+def stop_durations(cycle: Cycle, rng: np.random.Generator) -> Cycle:
+    """Each stop longer or shorter by a lognormal factor of its own, spread 0.5, at least 1 s."""
+    pieces = []
+    for start, end, standing in _phases(cycle.speed_mps):
+        if standing:
+            factor = np.exp(STOP_SPREAD * rng.standard_normal())
+            pieces.append(np.full(max(round((end - start) * factor), 1), start))
+        else:
+            pieces.append(np.arange(start, end))
+    index = np.concatenate(pieces)
+    return _at(cycle, index if len(index) > 1 else np.arange(len(cycle.time_s)))
+
+
+def another_day(cycle: Cycle, rng: np.random.Generator) -> Cycle:
+    """The trip's micro-trips in random order: right in sum, wrong in place.
+
+    A micro-trip is a drive and the stop after it. A trip that does not stop on its way has one
+    only and stays as it is.
+    """
+    driving = [start for start, _, standing in _phases(cycle.speed_mps) if not standing]
+    if not driving:
+        return cycle
+    bounds = [*driving, len(cycle.speed_mps)]
+    trips = [np.arange(a, b) for a, b in pairwise(bounds)]
+    order = rng.permutation(len(trips))
+    return _at(cycle, np.concatenate([np.arange(driving[0]), *(trips[i] for i in order)]))
+
+
+def combined(cycle: Cycle, rng: np.random.Generator) -> Cycle:
+    """Wrong stops, stretch, shift and speed noise at once."""
+    for model in (stop_durations, travel_time_stretch, shift, speed_noise):
+        cycle = model(cycle, rng)
+    return cycle
+
+
+MODELS: dict[str, Model] = {
+    "speed noise": speed_noise,
+    "travel time": travel_time_stretch,
+    "shift": shift,
+    "stops": stop_durations,
+    "another day": another_day,
+    "combined": combined,
+}
+
+
+def forecast(cycle: Cycle, vehicle: Vehicle, model: str, seed: int) -> Trace:
+    """Make a wrong forecast of a trip; its length may differ from the trip's.
+
+    Parameters
+    ----------
+    cycle : the true trip
+    vehicle : whose demand is forecast
+    model : one of `MODELS`
+    seed : equal seeds give equal forecasts
+
+    Raises
+    ------
+    InputError
+        If there is no such model.
+    """
+    if model not in MODELS:
+        raise InputError(f"unknown forecast error {model!r}: use one of {', '.join(MODELS)}")
+    rng = np.random.default_rng([list(MODELS).index(model), seed])
+    return Trace.of(MODELS[model](cycle, rng), vehicle)
+
+
+def _phases(speed_mps: Floats) -> list[tuple[int, int, bool]]:
+    """Runs of points that stand or drive: (first, one after the last, standing)."""
+    standing = speed_mps <= 0.0
+    edges = [0, *(np.flatnonzero(np.diff(standing)) + 1).tolist(), len(standing)]
+    return [(a, b, bool(standing[a])) for a, b in pairwise(edges)]
+
+
+def _at(cycle: Cycle, index: NDArray[np.intp]) -> Cycle:
+    """The cycle's points in another order or number."""
+    time_s = np.arange(float(len(index)))
+    return Cycle(cycle.name, time_s, cycle.speed_mps[index], cycle.grade[index])
