@@ -33,7 +33,8 @@ def compare_html(
     """
     vehicle = runs[0].vehicle
     columns = filled(COMPARE_COLUMNS, rows)
-    names = {run.controller.replace("-", "_") for run in runs}
+    # the rules are also the last resort of other controllers
+    names = {"rule_based", *(run.controller.replace("-", "_") for run in runs)}
     template = files("qpmpc.report").joinpath("compare.html.j2").read_text("utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     return environment.from_string(template).render(
@@ -69,7 +70,8 @@ def _remarks(rows: Sequence[Row], settings: ControllerSettings) -> list[str]:
         "Controllers with a preview are given the true trip, in the short and in the long horizon: "
         "no forecast error.",
         "Step times are wall times of one decision in this Python process, all runs one after the "
-        "other. The longest of a QP controller is its first: it solves from cold at departure.",
+        "other. A QP controller that is prepared (its setting below) solves its first QP before "
+        "the trip starts: that time is not among them.",
     ]
     if REFERENCE in present:
         remarks.append(
