@@ -123,7 +123,7 @@ class MhQp:
         p_eng, on = float(x[Var.P_ENG]), float(x[Var.ON])
         fuel, battery = self._model.fuel, self._model.battery
         least_fuel = float((fuel.slope * p_eng + fuel.intercept * on).max())
-        off_w = float(self.planner.qp.off_power_w(net_w))
+        off_w = float(plan.stages.internal_off_w[0])
         on_part = battery.slope * (on * net_w - p_eng) + battery.intercept * on
         least_internal = float(on_part.max()) + (1.0 - on) * off_w
         lhv_j_per_g = self._vehicle.engine.lhv_j_per_kg * 1e-3

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.cycles import Cycle
+from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.demand import demand_w
 from qpmpc.vehicle.parameters import Vehicle
 
@@ -43,3 +44,12 @@ class Trace:
         most = battery.power_discharge_max_w + vehicle.engine.power_max_w
         net = self.demand_w + battery.aux_power_w
         return np.clip(net, -battery.power_charge_max_w, most)
+
+    def internal_off_w(self, vehicle: Vehicle) -> NDArray[np.float64]:
+        """Internal battery power with the engine off, l(P0), W, shape (steps,).
+
+        At the trip's initial SOC; where the battery alone cannot meet P0, at its limit.
+        """
+        battery = vehicle.battery
+        power = np.minimum(self.battery_side_w(vehicle), battery.power_discharge_max_w)
+        return BatteryMaps(battery).internal_power_w(vehicle.trip.soc_init, power)

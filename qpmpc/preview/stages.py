@@ -9,6 +9,8 @@ from qpmpc.preview.forecast import Trace
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.vehicle.parameters import Vehicle
 
+FIELDS = 4  # of `Stages`
+
 
 @dataclass(frozen=True)
 class Stages:
@@ -21,11 +23,14 @@ class Stages:
     duration_s : h_k
     net_w : P0 = P_d + P_aux, mean over the stage
     speed_mps : mean speed
+    internal_off_w : mean of the internal battery power l(P0) with the engine off; by convexity
+        more than l of the mean
     """
 
     duration_s: NDArray[np.float64]
     net_w: NDArray[np.float64]
     speed_mps: NDArray[np.float64]
+    internal_off_w: NDArray[np.float64]
 
 
 class StageBuilder:
@@ -54,8 +59,7 @@ class StageBuilder:
     ) -> None:
         self.settings = settings
         self.steps = truth.steps
-        self._short_net_w = truth.battery_side_w(vehicle)
-        self._short_speed_mps = truth.speed_mps
+        self._short = _fields(truth, vehicle)
         demand_class = _demand_class(forecast.demand_w, settings)
         self._cumulative = _cumulative(forecast, vehicle, demand_class, settings.classes)
         block_s = settings.block_length_s(forecast.steps)
@@ -67,18 +71,16 @@ class StageBuilder:
         """Return the stages of the horizon that starts at time step `step`."""
         n_short = self.settings.short_stages
         seen = min(n_short, self.steps - step)
-        fields = np.zeros((3, self.count))
-        fields[0, :seen] = 1.0
-        fields[1, :seen] = self._short_net_w[step : step + seen]
-        fields[2, :seen] = self._short_speed_mps[step : step + seen]
+        fields = np.zeros((FIELDS, self.count))
+        fields[:, :seen] = self._short[:, step : step + seen]
         arriving = step + n_short >= self.steps
         start = np.clip(step + seen, self._block_start, self._block_end)
         start = self._block_end if arriving else start
-        # (classes, 3, blocks) -> fields of the long stages, block by block, class by class
+        # (classes, FIELDS, blocks) -> fields of the long stages, block by block, class by class
         sums = self._cumulative[:, :, self._block_end] - self._cumulative[:, :, start]
         duration = sums[:, 0].T.ravel()
         fields[0, n_short:] = duration
-        fields[1:, n_short:] = sums[:, 1:].transpose(1, 2, 0).reshape(2, -1)
+        fields[1:, n_short:] = sums[:, 1:].transpose(1, 2, 0).reshape(FIELDS - 1, -1)
         fields[1:, n_short:] /= np.maximum(duration, 1.0)
         return Stages(*fields)
 
@@ -93,6 +95,18 @@ class StageBuilder:
         return source
 
 
+def _fields(trace: Trace, vehicle: Vehicle) -> NDArray[np.float64]:
+    """Duration, P0, speed and l(P0) of each 1 s step, in the order of `Stages`; (FIELDS, steps)."""
+    return np.stack(
+        [
+            np.ones(trace.steps),
+            trace.battery_side_w(vehicle),
+            trace.speed_mps,
+            trace.internal_off_w(vehicle),
+        ]
+    )
+
+
 def _demand_class(demand_w: NDArray[np.float64], settings: HorizonSettings) -> NDArray[np.intp]:
     """Class of each step: 0 hard, 1 easy, 2 braking; all 0 with one class."""
     if settings.classes == 1:
@@ -104,16 +118,14 @@ def _demand_class(demand_w: NDArray[np.float64], settings: HorizonSettings) -> N
 def _cumulative(
     forecast: Trace, vehicle: Vehicle, demand_class: NDArray[np.intp], classes: int
 ) -> NDArray[np.float64]:
-    """Running sums over time of duration, P0 and speed, apart for each class.
+    """Running sums over time of duration, P0, speed and l(P0), apart for each class.
 
     Returns
     -------
-    shape (classes, 3, steps + 1)
+    shape (classes, FIELDS, steps + 1)
     """
-    fields = np.stack(
-        [np.ones(forecast.steps), forecast.battery_side_w(vehicle), forecast.speed_mps]
-    )
+    fields = _fields(forecast, vehicle)
     member = demand_class == np.arange(classes)[:, None]
-    sums = np.zeros((classes, 3, forecast.steps + 1))
+    sums = np.zeros((classes, FIELDS, forecast.steps + 1))
     np.cumsum(fields[None] * member[:, None], axis=2, out=sums[:, :, 1:])
     return sums

@@ -34,8 +34,8 @@ class PwaTolerances(BaseModel):
 
     fuel_g_per_s: Tolerance = 0.0015
     fuel_knee_w: Tolerance = 20e3
-    battery_w: Tolerance = 20.0
-    battery_share: Annotated[float, Field(ge=0.0, le=0.1)] = 0.005
+    battery_w: Tolerance = 6.0
+    battery_share: Annotated[float, Field(ge=0.0, le=0.1)] = 0.006
     alpha: Tolerance = 0.001
 
 

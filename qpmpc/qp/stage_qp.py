@@ -4,14 +4,13 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.scaling import Scaling, ScalingSettings
 from qpmpc.qp.structure import VARS, QpStructure, Rows, Var
-from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
@@ -102,7 +101,6 @@ class StageQp:
         self.rows = Rows(model.fuel.pieces, model.battery.pieces)
         self.structure = QpStructure(stages, self.rows)
         self.stages = stages
-        self._maps = BatteryMaps(vehicle.battery)
         battery_rows = range(self.rows.battery.start, self.rows.battery.stop)
         self._battery_on = [self.structure.index[row, Var.ON, False] for row in battery_rows]
         self._values = self._constant_entries()
@@ -179,7 +177,7 @@ class StageQp:
         """SOC dynamics, battery pieces in perspective, and SOC limits that can be met."""
         index, rows, battery = self.structure.index, self.rows, self.vehicle.battery
         net, h, energy = stages.net_w, stages.duration_s, self.model.battery_energy_j
-        off_w = self.off_power_w(net)
+        off_w = stages.internal_off_w
         self._values[:, index[rows.soc, Var.INTERNAL, False]] = h / energy
         self._lower[0, rows.soc] = self._upper[0, rows.soc] = soc
         pieces = self.model.battery
@@ -191,11 +189,6 @@ class StageQp:
         if not self.settings.soc_penalty_g:
             low[-1] = max(self._terminal(self.settings.terminal_low), battery.soc_min)
         self._lower[:, rows.box_soc] = np.minimum(low, self._reachable_soc(stages, soc))
-
-    def off_power_w(self, net_w: ArrayLike) -> Floats:
-        """Internal battery power with the engine off, l(P0) at the trip's initial SOC, W."""
-        limited = np.minimum(net_w, self.vehicle.battery.power_discharge_max_w)
-        return self._maps.internal_power_w(self.vehicle.trip.soc_init, limited)
 
     def _reachable_soc(self, stages: Stages, soc: float) -> Floats:
         """Highest SOC at the end of each stage, charging all the way: a limit above it is moot."""

@@ -99,7 +99,9 @@ def test_one_stage_optimum_is_the_model_itself():
     # One second, engine forced on by a demand the battery cannot meet: F, G and the states are
     # then the PWA curves and the plant's balances, by hand.
     net = VEHICLE.battery.power_discharge_max_w + 10e3
-    stages = Stages(np.array([1.0]), np.array([net]), np.array([20.0]))
+    trace = Trace(np.array([net - VEHICLE.battery.aux_power_w]), np.array([20.0]))
+    off = trace.internal_off_w(VEHICLE)
+    stages = Stages(np.array([1.0]), np.array([net]), np.array([20.0]), off)
     qp = StageQp(VEHICLE, MODEL, 1, QpSettings(terminal_low=0.7), ScalingSettings())
     x, _ = _lowest(qp, qp.update(stages, 0.6, 60.0, _about(1, 60.0, 0.0)))
     sigma, p_eng = x[0, Var.ON], x[0, Var.P_ENG]
@@ -116,7 +118,8 @@ def test_constant_demand_without_thermal_coupling_is_charge_sustaining():
     # demand is optimal: battery use only adds losses, so E = P0 in every stage.
     net = 12e3
     n = 6
-    stages = Stages(np.full(n, 10.0), np.full(n, net), np.full(n, 20.0))
+    off = Trace(np.full(n, net - VEHICLE.battery.aux_power_w), np.zeros(n)).internal_off_w(VEHICLE)
+    stages = Stages(np.full(n, 10.0), np.full(n, net), np.full(n, 20.0), off)
     vehicle = VEHICLE.with_settings({"cold_engine.k": 0.0, "trip.t_cl_init_degc": 70.0})
     model = PwaModel.of(vehicle)
     qp = StageQp(vehicle, model, n, QpSettings(), ScalingSettings())
