@@ -21,6 +21,8 @@ ONE = np.uint32(1)
 EDGE = 1e-9  # tolerance at the edge of a grid, in cells
 MARGIN = 1e-9  # kept from the limits, so that rounding cannot cross them
 ROUNDING = 1e-14  # at SOC_max, where the brakes hold the battery exactly
+LIMIT_FACTOR = 30.0  # see command_cost
+EDGE_FACTOR = 2.0
 BISECTIONS = 60
 BLOCK = 16  # rows that share one pass over the tables, to stay in the processor's cache
 REFINEMENTS = 4
@@ -60,8 +62,8 @@ class Maps(NamedTuple):
     t_cl_min_degc: float
     t_cl_max_degc: float
     start_fuel_g: float
-    soc_penalty_g: float
-    t_cl_penalty_g_per_k: float
+    soc_worth_g: float
+    t_cl_worth_g_per_k: float
 
 
 class Lattice(NamedTuple):
@@ -291,9 +293,15 @@ def landing(maps: Maps, step: Step, soc: float, t_cl: float, start_g: float) -> 
 
 
 @compiled
+def on_axis(position: float, points: int) -> float:
+    """Clamp a position to an axis."""
+    return min(max(position, 0.0), points - 1.0)
+
+
+@compiled
 def cell(position: float, points: int) -> tuple[int, float]:
     """Split a position on an axis, clamped to it, into lower node and weight of the upper one."""
-    position = min(max(position, 0.0), points - 1.0)
+    position = on_axis(position, points)
     lower = min(int(position), points - 2)
     return lower, position - lower
 
@@ -348,7 +356,9 @@ def command_cost(
 ) -> float:
     """Fuel of one command plus W_{k+1} where it leads.
 
-    Leaving limits or grid costs infinity if `strict`, else a penalty on the distance.
+    Leaving limits or grid costs infinity if `strict`. Else each unit beyond a limit costs
+    LIMIT_FACTOR times the fuel that would make up for it, and each unit beyond the grid
+    EDGE_FACTOR times. More charge than the grid holds is given away: charge never harms.
     """
     soc, t_cl = state
     states, rows, columns = following.shape
@@ -367,11 +377,13 @@ def command_cost(
             return INF
         penalty = 0.0
     else:
-        soc_low = step.coast_soc if step.last else target.soc_origin
-        soc_high = target.soc_origin + (rows - 1) * target.soc_spacing
-        t_high = target.t_cl_origin + (columns - 1) * target.t_cl_spacing
-        penalty = maps.soc_penalty_g * max(soc_low - soc_end, soc_end - soc_high, 0.0)
-        penalty += maps.t_cl_penalty_g_per_k * max(target.t_cl_origin - t_end, t_end - t_high, 0.0)
+        least_soc = max(step.coast_soc, maps.soc_min) if step.last else maps.soc_min
+        soc_excess = max(least_soc - soc_end, soc_end - maps.soc_max, 0.0)
+        t_excess = max(maps.t_cl_min_degc - t_end, t_end - maps.t_cl_max_degc, 0.0)
+        t_beyond = abs(t_end - target.t_cl_origin - on_axis(column, columns) * target.t_cl_spacing)
+        soc_below = max(target.soc_origin - soc_end, 0.0)
+        penalty = maps.soc_worth_g * (LIMIT_FACTOR * soc_excess + EDGE_FACTOR * soc_below)
+        penalty += maps.t_cl_worth_g_per_k * (LIMIT_FACTOR * t_excess + EDGE_FACTOR * t_beyond)
     if step.last:
         return fuel + penalty
     after = 1 if on and states == 2 else 0

@@ -9,8 +9,6 @@ from qpmpc.errors import InputError
 from qpmpc.vehicle import Plant, Vehicle, demand_w
 from qpmpc.verification.dynamic_programming.kernels import Bools, Floats, Maps
 
-PENALTY_FACTOR = 30.0  # on the price of an infeasible SOC or T, in fuel that would restore it
-
 
 @dataclass(frozen=True)
 class Problem:
@@ -115,8 +113,8 @@ def build_problem(cycle: Cycle, vehicle: Vehicle) -> Problem:
         t_cl_min_degc=thermal.t_cl_min_degc,
         t_cl_max_degc=thermal.t_cl_max_degc,
         start_fuel_g=engine.start_fuel_g,
-        soc_penalty_g=PENALTY_FACTOR * fuel_per_soc,
-        t_cl_penalty_g_per_k=PENALTY_FACTOR * thermal.heat_capacity_j_per_k / lhv_j_per_g,
+        soc_worth_g=fuel_per_soc,
+        t_cl_worth_g_per_k=thermal.heat_capacity_j_per_k / lhv_j_per_g,
     )
     return Problem(
         plant=plant,
