@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
@@ -98,6 +98,7 @@ def check_admissible(solution: DpSolution, cycle: Cycle, vehicle: Vehicle) -> No
 # the model inside is the plant
 
 
+@settings(deadline=None)  # the first call compiles
 @given(
     soc=st.floats(0.4, 0.8),
     t_cl=st.floats(40.0, 90.0),
