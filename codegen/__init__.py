@@ -1,1 +1,7 @@
-"""The controller as C for embedded targets."""
+"""The whole controller as C: generator, host library, firmware, processor in the loop."""
+
+from qpmpc.codegen.controller import GeneratedController, generated_controller
+from qpmpc.codegen.generate import generate
+from qpmpc.codegen.values import Values, values_of
+
+__all__ = ["GeneratedController", "Values", "generate", "generated_controller", "values_of"]

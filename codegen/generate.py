@@ -1,0 +1,135 @@
+"""Generator: the C project of one controller, from templates and the runtime's own files."""
+
+from importlib import import_module, resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpmpc import __version__
+from qpmpc.codegen.values import Values
+from qpmpc.errors import InputError
+from qpmpc.files import check_folder, write_text
+
+Precision = Literal["f32", "f64"]
+Target = Literal["host", "cortex-m7"]
+PRECISIONS: tuple[Precision, ...] = ("f32", "f64")
+TARGETS: tuple[Target, ...] = ("host", "cortex-m7")
+
+VALUES_A_LINE = 6
+_STRETCH = {
+    0.0: "REAL(1.0)",
+    0.5: "(REAL(1.0) / REAL_SQRT(duration_s))",
+    1.0: "(REAL(1.0) / (duration_s))",
+}
+
+
+def generate(
+    values: Values, folder: Path, target: Target = "host", precision: Precision = "f32"
+) -> list[Path]:
+    """Write the C project of a controller; same input, same bytes.
+
+    Parameters
+    ----------
+    values : numbers of the controller, see `values_of`
+    folder : of the project; files of the same names are replaced, others left alone
+    target : `host` (shared library) or `cortex-m7` (bare metal, for QEMU's mps2-an500)
+    precision : of all arithmetic
+
+    Returns
+    -------
+    the files written
+
+    Raises
+    ------
+    InputError
+        If target or precision is unknown or the folder cannot be written to.
+    """
+    check_folder(folder, "output folder")
+    files = project_files(values, target, precision)
+    for name, text in files.items():
+        write_text(folder / name, text)
+    return [folder / name for name in files]
+
+
+def project_files(
+    values: Values, target: Target = "host", precision: Precision = "f32"
+) -> dict[str, str]:
+    """Return the text of every file of the project, by name.
+
+    Raises
+    ------
+    InputError
+        If target or precision is unknown.
+    """
+    if target not in TARGETS:
+        raise InputError(f"unknown target {target!r}: use one of {', '.join(TARGETS)}")
+    if precision not in PRECISIONS:
+        raise InputError(f"unknown precision {precision!r}: use one of {', '.join(PRECISIONS)}")
+    root = resources.files("qpmpc.codegen")
+    files = {p.name: p.read_text("utf-8") for p in _sorted(root / "runtime")}
+    if target == "cortex-m7":
+        files |= {p.name: p.read_text("utf-8") for p in _sorted(root / "cortex_m7")}
+    jinja2 = _jinja2()
+    environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(lambda name: (root / "templates" / name).read_text("utf-8")),
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+        trim_blocks=False,
+        autoescape=False,
+    )
+    context = _context(values, target, precision)
+    for output, template in {
+        "mpc_config.h": "mpc_config.h.j2",
+        "mpc_data.c": "mpc_data.c.j2",
+        "Makefile": f"Makefile.{target}.j2",
+        "README.md": "README.md.j2",
+        "NOTICE": "NOTICE.j2",
+    }.items():
+        sources = sorted(name for name in [*files, "mpc_data.c"] if name.endswith(".c"))
+        text = environment.get_template(template).render(**context, sources=dict.fromkeys(sources))
+        files[output] = text
+    return dict(sorted(files.items()))
+
+
+def _jinja2() -> ModuleType:
+    try:
+        return import_module("jinja2")
+    except ImportError as error:
+        raise InputError(
+            "generating code needs jinja2, which is not installed: pip install 'qpmpc-iptm[plot]'"
+        ) from error
+
+
+def _sorted(folder: Traversable) -> list[Traversable]:
+    return sorted((p for p in folder.iterdir() if p.is_file()), key=lambda p: p.name)
+
+
+def _context(values: Values, target: Target, precision: Precision) -> dict[str, Any]:
+    def literal(number: float) -> str:
+        if precision == "f32":
+            return f"{np.float32(number)!s}f"
+        return repr(float(number))
+
+    def rows(array: NDArray[np.float64]) -> list[str]:
+        texts = [literal(x) for x in array.tolist()]
+        cuts = range(0, len(texts), VALUES_A_LINE)
+        return [", ".join(texts[i : i + VALUES_A_LINE]) for i in cuts]
+
+    scalars = {name: literal(value) for name, value in values.scalars.items()}
+    scalars["rule_min_on_s"] = str(values.min_on_s)
+    exponent = values.duration_exponent
+    power = f"REAL_POW((duration_s), REAL({-exponent!r}))"
+    return {
+        "version": __version__,
+        "target": target,
+        "precision": precision,
+        "values": values,
+        "sizes": values.sizes,
+        "scalars": sorted(scalars.items()),
+        "arrays": sorted((name, rows(array)) for name, array in values.arrays.items()),
+        "stretch": _STRETCH.get(exponent, power),
+    }

@@ -1,0 +1,171 @@
+"""The generated controller as a shared library of this machine, built once and kept."""
+
+import ctypes
+import hashlib
+import os
+import shutil
+import subprocess
+import tempfile
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from qpmpc.codegen.generate import Precision, generate, project_files
+from qpmpc.codegen.values import Values
+from qpmpc.errors import QpmpcError
+
+ABI_VERSION = 1
+_ABI_NAMES = (
+    "version",
+    "sizeof real_t",
+    "sizeof mpc_in",
+    "sizeof mpc_out",
+    "sizeof mpc_state",
+    "MPC_SHORT",
+    "MPC_LONG",
+    "MPC_VARS",
+    "MPC_ROWS",
+    "MPC_ITERATIONS",
+    "offset of short_count",
+    "offset of engine_on",
+)
+VARS = 7
+_STATE = 4
+
+
+class CodegenError(QpmpcError):
+    """A generated controller could not be built or does not fit its caller."""
+
+
+def compiler() -> str | None:
+    """Return the C compiler of this machine: $CC, cc, gcc or clang; None if there is none."""
+    names = [os.environ.get("CC", ""), "cc", "gcc", "clang"]
+    return next((found for name in names if name and (found := shutil.which(name))), None)
+
+
+@cache
+def structures(precision: Precision, short: int, long: int) -> tuple[Any, Any]:
+    """Return the ctypes twins of `mpc_in` and `mpc_out`."""
+    real = ctypes.c_float if precision == "f32" else ctypes.c_double
+
+    class MpcIn(ctypes.Structure):
+        _fields_ = [
+            ("soc", real),
+            ("t_cl_degc", real),
+            ("demand_w", real),
+            ("speed_mps", real),
+            ("short_demand_w", real * short),
+            ("short_speed_mps", real * short),
+            ("long_duration_s", real * long),
+            ("long_net_w", real * long),
+            ("long_speed_mps", real * long),
+            ("long_internal_off_w", real * long),
+            ("short_count", ctypes.c_int32),
+        ]
+
+    class MpcOut(ctypes.Structure):
+        _fields_ = [
+            ("p_eng_w", real),
+            ("sigma", real),
+            ("relaxation_gap", real),
+            ("engine_on", ctypes.c_int32),
+            ("rung", ctypes.c_int32),
+            ("flags", ctypes.c_int32),
+            ("iterations", ctypes.c_int32),
+        ]
+
+    return MpcIn, MpcOut
+
+
+class HostLibrary:
+    """A loaded library, its layout checked.
+
+    Attributes
+    ----------
+    input_type, output_type : ctypes structures
+    state_bytes : size of one controller's memory
+    """
+
+    def __init__(self, file: Path, values: Values, precision: Precision) -> None:
+        sizes = values.sizes
+        self.values, self.precision = values, precision
+        self.real = ctypes.c_float if precision == "f32" else ctypes.c_double
+        self.input_type, self.output_type = structures(
+            precision, sizes.short_stages, sizes.long_stages
+        )
+        self._library = ctypes.CDLL(str(file))
+        found = [self._library.mpc_abi(i) for i in range(len(_ABI_NAMES))]
+        self.state_bytes = found[_STATE]
+        expected = [
+            ABI_VERSION,
+            ctypes.sizeof(self.real),
+            ctypes.sizeof(self.input_type),
+            ctypes.sizeof(self.output_type),
+            self.state_bytes,
+            sizes.short_stages,
+            sizes.long_stages,
+            VARS,
+            sizes.rows,
+            values.iterations,
+            self.input_type.short_count.offset,
+            self.output_type.engine_on.offset,
+        ]
+        for name, have, want in zip(_ABI_NAMES, found, expected, strict=True):
+            if have != want:
+                raise CodegenError(f"{file}: {name} is {have}, expected {want}")
+        self.init = self._library.mpc_init
+        self.depart = self._library.mpc_depart
+        self.step = self._library.mpc_step
+        self.plan = self._library.mpc_plan
+
+
+def build_host_library(values: Values, precision: Precision = "f64") -> HostLibrary:
+    """Generate, compile and load a controller; kept in the user's cache by its contents.
+
+    Raises
+    ------
+    CodegenError
+        If there is no compiler, or it fails.
+    """
+    command = compiler()
+    if command is None:
+        raise CodegenError("no C compiler found (tried $CC, cc, gcc, clang)")
+    digest = hashlib.sha256(command.encode())
+    for name, text in project_files(values, "host", precision).items():
+        digest.update(f"{name}\0{text}\0".encode())
+    kept = _cache_folder() / f"{digest.hexdigest()[:24]}.so"
+    if not kept.exists():
+        _build(values, precision, command, kept)
+    return HostLibrary(kept, values, precision)
+
+
+def _cache_folder() -> Path:
+    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    folder = Path(base) / "qpmpc-iptm"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if os.access(folder, os.W_OK):
+            return folder
+    except OSError:
+        pass
+    folder = Path(tempfile.gettempdir()) / f"qpmpc-iptm-{os.getuid()}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    return folder
+
+
+def _build(values: Values, precision: Precision, command: str, kept: Path) -> None:
+    with tempfile.TemporaryDirectory(dir=kept.parent) as scratch:
+        folder = Path(scratch)
+        generate(values, folder, "host", precision)
+        flags = "-O2 -std=c99 -Wall -Wextra -Wconversion -Werror -ffp-contract=off -fPIC -shared"
+        sources = sorted(file.name for file in folder.glob("*.c"))
+        result = subprocess.run(
+            [command, *flags.split(), "-o", "libmpc.so", *sources, "-lm"],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if result.returncode:
+            raise CodegenError(f"{command} failed: {result.stderr.strip().splitlines()[:1]}")
+        (folder / "libmpc.so").replace(kept)

@@ -1,0 +1,102 @@
+/* Multi-horizon predictive energy and thermal management of a hybrid car: public interface.
+ *
+ * One controller is one `mpc_state`, in memory of the caller. Nothing else is written, so any
+ * number of controllers may run side by side. No allocation, no recursion, no input or output.
+ *
+ *     mpc_init(&state);
+ *     while (mpc_depart(&state, &in) > 0) { }      optional, before the trip: see below
+ *     every second: fill in `in`; mpc_step(&state, &in, &out); obey `out`
+ *
+ * Every call of mpc_step and of mpc_depart does at most MPC_ITERATIONS solver iterations and one
+ * factorisation: a fixed amount of arithmetic.
+ *
+ * Without a departure the solver starts cold inside mpc_step: the rules drive until
+ * MPC_WARM_UP_STEPS seconds' iterations have been spent. The same after a failure of the solver.
+ */
+#ifndef MPC_H
+#define MPC_H
+
+#include <stdint.h>
+
+#include "mpc_config.h"
+#include "mpc_state.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* What is known at the start of a second. Power in W, speed in m/s, temperature in degC. */
+typedef struct {
+    real_t soc;       /* measured state of charge, 0..1 */
+    real_t t_cl_degc; /* measured coolant temperature */
+    real_t demand_w;  /* power demand of the coming second, negative when braking */
+    real_t speed_mps; /* speed of the coming second */
+    /* accurate preview of the coming seconds; the first is the coming second itself */
+    real_t short_demand_w[MPC_SHORT];
+    real_t short_speed_mps[MPC_SHORT];
+    /* statistics of what lies beyond, block by block, in each block class by class (hard driving,
+     * easy driving, braking): seconds, mean of the net power P0 = demand + auxiliaries (each
+     * second clipped at the battery's charge limit before the mean is taken), mean speed, mean of
+     * the internal battery power l(P0) with the engine off. 0 seconds where nothing is left. */
+    real_t long_duration_s[MPC_LONG];
+    real_t long_net_w[MPC_LONG];
+    real_t long_speed_mps[MPC_LONG];
+    real_t long_internal_off_w[MPC_LONG];
+    int32_t short_count; /* seconds of the short preview that lie before arrival, 1..MPC_SHORT */
+} mpc_in;
+
+/* Which rung of the ladder the command comes from. */
+enum {
+    MPC_OPTIMISED = 0,    /* the plan of this second */
+    MPC_SHIFTED_PLAN = 1, /* a plan of at most MPC_PLAN_VALID_STEPS seconds ago */
+    MPC_RULES = 2         /* rules that need no plan */
+};
+
+/* Why it is not the first rung: bits of mpc_out.flags. */
+enum {
+    MPC_BAD_MEASUREMENT = 1, /* soc, t_cl_degc, demand_w or speed_mps; the last good one counts */
+    MPC_BAD_PREVIEW = 2,     /* short or long preview; no new plan is made */
+    MPC_SOLVER_FAILED = 4,   /* no usable solution; the solver starts cold */
+    MPC_WARMING_UP = 8       /* the solver has not converged yet since a cold start */
+};
+
+typedef struct {
+    real_t p_eng_w;        /* engine power; 0 with the engine off */
+    real_t sigma;          /* planned on-share of the coming second; 0 if there is no new plan */
+    real_t relaxation_gap; /* relative slack of the relaxed curves; 0 if there is no new plan */
+    int32_t engine_on;     /* 0 or 1 */
+    int32_t rung;
+    int32_t flags;
+    int32_t iterations; /* of the solver in this call */
+} mpc_out;
+
+/* Set a defined state: no plan, cold solver, rules at rest. */
+void mpc_init(mpc_state *state);
+
+/* Do one slice of the departure: a cold solve, linearised MPC_DEPARTURE_LINEARISATIONS times.
+ *
+ * To be called after mpc_init, with the same `in`, until it returns 0. Returns 1 while slices
+ * remain and -1, having done nothing, on bad input. Once mpc_step has been called there is nothing
+ * left to do: it returns 0.
+ */
+int32_t mpc_depart(mpc_state *state, const mpc_in *in);
+
+/* Decide one second. Whatever `in` holds, `out` is finite and in range; returns out->flags. */
+int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out);
+
+/* Copy the last solution in SI units, for diagnosis: MPC_STAGES rows of MPC_VARS variables in the
+ * order soc, t_cl_degc, p_eng_w, on, fuel_g_per_s, internal_w, t_slack_k, and MPC_STAGES rows of
+ * MPC_ROWS duals (g of fuel per unit). */
+void mpc_plan(const mpc_state *state, real_t *x, real_t *duals);
+
+/* Layout of this build, so that a caller in another language can check its own: version of this
+ * interface, sizeof real_t, mpc_in, mpc_out, mpc_state, then MPC_SHORT, MPC_LONG, MPC_VARS,
+ * MPC_ROWS, MPC_ITERATIONS, offset of mpc_in.short_count, of mpc_out.engine_on. */
+#define MPC_ABI_VERSION 1
+#define MPC_ABI_ENTRIES 12
+int32_t mpc_abi(int32_t entry);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

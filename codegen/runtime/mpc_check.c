@@ -1,0 +1,51 @@
+/* Inputs that can be believed: finite and within what physics allows. */
+#include "mpc_model.h"
+#include "mpc_parts.h"
+#include "mpc_real.h"
+
+#define LARGEST_POWER_W REAL(1.0e6)
+#define LARGEST_SPEED_MPS REAL(150.0)
+#define COLDEST_DEGC REAL(-60.0)
+#define HOTTEST_DEGC REAL(150.0)
+#define LONGEST_STAGE_S REAL(1.0e5)
+
+/* False for NaN, whatever the bounds. */
+static int32_t within(real_t x, real_t low, real_t high)
+{
+    return ((x >= low) && (x <= high)) ? 1 : 0;
+}
+
+static int32_t take(real_t *good, real_t value, real_t low, real_t high)
+{
+    const int32_t fine = within(value, low, high);
+    if (fine != 0) {
+        *good = value;
+    }
+    return fine;
+}
+
+/* Take over every measured value that is good; the others keep the last good one. */
+int32_t check_measured(mpc_measured *good, const mpc_in *in)
+{
+    int32_t fine = take(&good->soc, in->soc, REAL(0.0), REAL(1.0));
+    fine &= take(&good->t_cl_degc, in->t_cl_degc, COLDEST_DEGC, HOTTEST_DEGC);
+    fine &= take(&good->demand_w, in->demand_w, -LARGEST_POWER_W, LARGEST_POWER_W);
+    fine &= take(&good->speed_mps, in->speed_mps, REAL(0.0), LARGEST_SPEED_MPS);
+    return fine;
+}
+
+int32_t check_preview(const mpc_in *in)
+{
+    int32_t fine = ((in->short_count >= 1) && (in->short_count <= MPC_SHORT)) ? 1 : 0;
+    for (int32_t k = 0; k < MPC_SHORT; k++) {
+        fine &= within(in->short_demand_w[k], -LARGEST_POWER_W, LARGEST_POWER_W);
+        fine &= within(in->short_speed_mps[k], REAL(0.0), LARGEST_SPEED_MPS);
+    }
+    for (int32_t k = 0; k < MPC_LONG; k++) {
+        fine &= within(in->long_duration_s[k], REAL(0.0), LONGEST_STAGE_S);
+        fine &= within(in->long_net_w[k], -LARGEST_POWER_W, LARGEST_POWER_W);
+        fine &= within(in->long_speed_mps[k], REAL(0.0), LARGEST_SPEED_MPS);
+        fine &= within(in->long_internal_off_w[k], -LARGEST_POWER_W, LARGEST_POWER_W);
+    }
+    return fine;
+}

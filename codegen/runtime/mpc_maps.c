@@ -1,0 +1,101 @@
+/* Maps of engine, battery and coolant: tables and closed forms. */
+#include "mpc_model.h"
+#include "mpc_parts.h"
+#include "mpc_real.h"
+
+/* Fuel of the hot engine on its optimal line, engine on: linear between grid points. */
+real_t map_fuel_g_per_s(real_t p_eng_w)
+{
+    const real_t place = real_clip(p_eng_w, REAL(0.0), mpc_par.engine_max_w) / mpc_par.fuel_step_w;
+    int32_t i = (int32_t)place;
+    if (i > (MPC_FUEL_POINTS - 2)) {
+        i = MPC_FUEL_POINTS - 2;
+    }
+    const real_t left = mpc_par.fuel_g_per_s[i];
+    return left + ((mpc_par.fuel_g_per_s[i + 1] - left) * (place - (real_t)i));
+}
+
+/* alpha(T) = 1 + k ((T_hot - T) / span)^e below T_hot, else 1 */
+real_t map_cold_factor(real_t t_cl_degc)
+{
+    const real_t below = real_max(mpc_par.cold_hot_degc - t_cl_degc, REAL(0.0));
+    return REAL(1.0)
+           + (mpc_par.cold_k * REAL_POW(below / mpc_par.cold_span_k, mpc_par.cold_exponent));
+}
+
+static real_t at_soc(const real_t *table, real_t soc)
+{
+    real_t value = table[0];
+    for (int32_t i = 1; i < MPC_SOC_POINTS; i++) {
+        const real_t left = mpc_par.soc_grid[i - 1];
+        const real_t share = (soc - left) / (mpc_par.soc_grid[i] - left);
+        const real_t inside = real_clip(share, REAL(0.0), REAL(1.0));
+        value += (table[i] - table[i - 1]) * inside;
+    }
+    return value;
+}
+
+/* min(P_chg, I (U + R I)) with the current I that fills the battery to soc_max in a second */
+real_t map_charge_limit_w(real_t soc)
+{
+    const real_t current = real_max(mpc_par.soc_max - soc, REAL(0.0)) * mpc_par.charge_c;
+    const real_t voltage = at_soc(mpc_par.open_circuit_v, soc)
+                           + (at_soc(mpc_par.resistance_charge_ohm, soc) * current);
+    return real_min(mpc_par.battery_charge_max_w, current * voltage);
+}
+
+real_t map_cabin_w(real_t t_cl_degc)
+{
+    const real_t span = mpc_par.cabin_heat_full_degc - mpc_par.cabin_heat_from_degc;
+    const real_t share = (t_cl_degc - mpc_par.cabin_heat_from_degc) / span;
+    return mpc_par.cabin_heat_w * real_clip(share, REAL(0.0), REAL(1.0));
+}
+
+/* Heat that leaves the coolant: to the air, through the radiator, into the cabin. */
+real_t map_cooling_w(real_t t_cl_degc, real_t speed_mps)
+{
+    const real_t over_k = t_cl_degc - mpc_par.t_amb_degc;
+    const real_t open = (t_cl_degc - mpc_par.thermostat_open_degc) / mpc_par.thermostat_span_k;
+    const real_t air = mpc_par.ua0_w_per_k + (mpc_par.ua1_w_per_k_per_mps * speed_mps);
+    const real_t radiator = real_clip(open, REAL(0.0), REAL(1.0)) * mpc_par.radiator_w_per_k;
+    return ((air + radiator) * over_k) + map_cabin_w(t_cl_degc);
+}
+
+/* Internal power of the battery, l(P) = U (U - sqrt(U^2 - 4 R P)) / (2 R), at the plan's SOC.
+ * Written as 2 U P / (U + sqrt(...)), which loses no digits at small P. */
+real_t map_planned_internal_w(real_t power_w)
+{
+    const real_t power = real_min(power_w, mpc_par.battery_discharge_max_w);
+    const real_t voltage = mpc_par.plan_voltage_v;
+    const real_t resistance = (power >= REAL(0.0)) ? mpc_par.plan_resistance_discharge_ohm
+                                                   : mpc_par.plan_resistance_charge_ohm;
+    const real_t root = (voltage * voltage) - (REAL(4.0) * resistance * power);
+    return (REAL(2.0) * voltage * power) / (voltage + REAL_SQRT(real_max(root, REAL(0.0))));
+}
+
+real_t pwa_alpha(real_t t_cl_degc)
+{
+    real_t most = (mpc_par.alpha_slope[0] * t_cl_degc) + mpc_par.alpha_intercept[0];
+    for (int32_t i = 1; i < MPC_ALPHA_PIECES; i++) {
+        most = real_max(most, (mpc_par.alpha_slope[i] * t_cl_degc) + mpc_par.alpha_intercept[i]);
+    }
+    return most;
+}
+
+real_t pwa_alpha_slope(real_t t_cl_degc)
+{
+    real_t slope = mpc_par.alpha_slope[0];
+    for (int32_t i = 1; i < MPC_ALPHA_PIECES; i++) {
+        slope = (t_cl_degc >= mpc_par.alpha_break[i]) ? mpc_par.alpha_slope[i] : slope;
+    }
+    return slope;
+}
+
+real_t pwa_battery(real_t power_w)
+{
+    real_t most = (mpc_par.battery_slope[0] * power_w) + mpc_par.battery_intercept[0];
+    for (int32_t j = 1; j < MPC_BATTERY_PIECES; j++) {
+        most = real_max(most, (mpc_par.battery_slope[j] * power_w) + mpc_par.battery_intercept[j]);
+    }
+    return most;
+}

@@ -1,0 +1,29 @@
+/* Arithmetic in the chosen precision. */
+#ifndef MPC_REAL_H
+#define MPC_REAL_H
+
+#include <math.h>
+
+#include "mpc_config.h"
+
+#define REAL(literal) ((real_t)(literal))
+
+#if MPC_F32
+#define REAL_SQRT(x) sqrtf(x)
+#define REAL_POW(x, y) powf((x), (y))
+#define REAL_ABS(x) fabsf(x)
+#else
+#define REAL_SQRT(x) sqrt(x)
+#define REAL_POW(x, y) pow((x), (y))
+#define REAL_ABS(x) fabs(x)
+#endif
+
+/* Of a NaN and a number, the number wins where it is the second argument. */
+static inline real_t real_min(real_t a, real_t b) { return (a < b) ? a : b; }
+static inline real_t real_max(real_t a, real_t b) { return (a > b) ? a : b; }
+static inline real_t real_clip(real_t x, real_t low, real_t high)
+{
+    return real_min(real_max(x, low), high);
+}
+
+#endif

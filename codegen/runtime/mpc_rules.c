@@ -1,0 +1,45 @@
+/* Last rung of the ladder: load levelling by rules, plus engine on for heat. No preview. */
+#include "mpc_model.h"
+#include "mpc_parts.h"
+#include "mpc_real.h"
+
+mpc_command rules_decide(rule_memory *memory, const mpc_measured *seen)
+{
+    const real_t net_w = seen->demand_w + mpc_par.aux_power_w;
+    const real_t requested_w = net_w + (mpc_par.rule_k_soc_w * (mpc_par.rule_soc_ref - seen->soc));
+    const int32_t long_enough = (memory->on_for_s >= mpc_par.rule_min_on_s) ? 1 : 0;
+    if ((requested_w > mpc_par.rule_on_w) || (seen->soc < mpc_par.rule_soc_forced)
+        || (net_w > mpc_par.battery_discharge_max_w)) {
+        memory->power_request = 1;
+    } else if ((requested_w < mpc_par.rule_off_w) && (long_enough != 0)) {
+        memory->power_request = 0;
+    } else {
+        /* between the thresholds: as before */
+    }
+    if (seen->t_cl_degc < mpc_par.rule_heat_on_degc) {
+        memory->heat_request = 1;
+    } else if (seen->t_cl_degc > mpc_par.rule_heat_off_degc) {
+        memory->heat_request = 0;
+    } else {
+        /* between the thresholds: as before */
+    }
+    mpc_command wish = {REAL(0.0), 0};
+    if (memory->power_request != 0) {
+        wish.engine_on = 1;
+        wish.p_eng_w = real_max(requested_w, mpc_par.rule_power_min_w);
+    } else if ((memory->heat_request != 0) || ((memory->on_for_s > 0) && (long_enough == 0))) {
+        wish.engine_on = 1;
+        wish.p_eng_w = mpc_par.rule_heat_power_w;
+    } else {
+        /* engine off */
+    }
+    const mpc_command command = safety_admissible(wish, seen);
+    if (command.engine_on == 0) {
+        memory->on_for_s = 0;
+    } else if (memory->on_for_s < mpc_par.rule_min_on_s) {
+        memory->on_for_s++; /* more than the shortest run need not be counted, nor overflow */
+    } else {
+        /* long enough */
+    }
+    return command;
+}

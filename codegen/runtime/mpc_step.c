@@ -1,0 +1,203 @@
+/* One second of the controller: plan, realise on/off, keep safe, degrade in steps. */
+#include <stddef.h>
+
+#include "mpc_model.h"
+#include "mpc_parts.h"
+#include "mpc_real.h"
+
+#define ON_THRESHOLD REAL(0.5) /* share of a second from which the engine runs */
+
+void mpc_init(mpc_state *state)
+{
+    unsigned char *const byte = (unsigned char *)state;
+    for (size_t i = 0U; i < sizeof(mpc_state); i++) {
+        byte[i] = 0U;
+    }
+    state->old_age = MPC_NO_PLAN;
+    state->phase = PHASE_COLD;
+    state->good.soc = mpc_par.soc_init;
+    state->good.t_cl_degc = mpc_par.t_cl_init_degc;
+}
+
+/* Make the values of this second and start at the last solution, or at nothing. */
+static void prepare(mpc_state *state, const mpc_in *in)
+{
+    const int32_t is_cold = (state->phase == PHASE_COLD) ? 1 : 0;
+    if (is_cold != 0) {
+        qp_linearise_cold(state, state->good.t_cl_degc);
+    } else {
+        qp_linearise_about_plan(state, state->good.t_cl_degc);
+    }
+    qp_road(state, in);
+    qp_update(state, state->good.soc, state->good.t_cl_degc);
+    admm_factorise(state);
+    if (is_cold != 0) {
+        admm_start_cold(state);
+    } else {
+        admm_to_solver_units(state);
+    }
+}
+
+/* Bring the iterate back into SI units; returns whether it is usable. If not, the solver is cold:
+ * nothing of a failed solve is kept. */
+static int32_t conclude(mpc_state *state)
+{
+    const int32_t usable = admm_usable(state);
+    admm_to_si_units(state);
+    state->phase = (usable != 0) ? PHASE_RUNNING : PHASE_COLD;
+    if (usable == 0) {
+        state->solves = 0;
+    } else if (state->solves < MPC_WARM_UP_STEPS) {
+        state->solves++;
+    } else {
+        /* warm */
+    }
+    return usable;
+}
+
+/* One slice: the first of a linearisation takes what does not fill a whole one. */
+static void depart_slice(mpc_state *state, const mpc_in *in)
+{
+    int32_t count = MPC_ITERATIONS;
+    if (state->phase != PHASE_DEPARTING) {
+        prepare(state, in);
+        state->phase = PHASE_DEPARTING;
+        state->depart_left = MPC_DEPARTURE_ITERATIONS;
+        count = ((MPC_DEPARTURE_ITERATIONS - 1) % MPC_ITERATIONS) + 1;
+    }
+    admm_iterate(state, count);
+    state->depart_left -= count;
+    if (state->depart_left == 0) {
+        state->depart_linearisation++;
+        if (conclude(state) == 0) {
+            state->depart_linearisation = MPC_DEPARTURE_LINEARISATIONS;
+        }
+    }
+}
+
+int32_t mpc_depart(mpc_state *state, const mpc_in *in)
+{
+    int32_t result = -1;
+    if ((check_measured(&state->good, in) & check_preview(in)) != 0) {
+        if (state->depart_linearisation < MPC_DEPARTURE_LINEARISATIONS) {
+            depart_slice(state, in);
+        }
+        result = 1;
+        if (state->depart_linearisation >= MPC_DEPARTURE_LINEARISATIONS) {
+            result = 0;
+            if ((state->phase == PHASE_RUNNING) && (state->is_under_way == 0)) {
+                state->solves = MPC_WARM_UP_STEPS;
+            }
+        }
+    }
+    return result;
+}
+
+/* What is left of the last solution at the start of another second. */
+static void move_on(mpc_state *state)
+{
+    if (state->phase == PHASE_DEPARTING) {
+        (void)conclude(state); /* a departure cut short is a warm start like any other */
+    }
+    if ((state->is_under_way != 0) && (state->phase == PHASE_RUNNING)) {
+        admm_shift(state);
+    }
+    if (state->old_age < MPC_NO_PLAN) {
+        state->old_age++;
+    }
+    state->is_under_way = 1;
+    state->depart_linearisation = MPC_DEPARTURE_LINEARISATIONS;
+}
+
+static void keep_plan(mpc_state *state)
+{
+    for (int32_t k = 0; k < MPC_SHORT; k++) {
+        state->old_sigma[k] = state->stage[k].x[VAR_ON];
+        state->old_p_eng_w[k] = state->stage[k].x[VAR_P_ENG];
+    }
+    state->old_age = 0;
+}
+
+/* On from an on-share of one half up, at the power E / sigma it stands for. */
+static mpc_command realise(const mpc_state *state)
+{
+    const real_t sigma = state->old_sigma[state->old_age];
+    mpc_command command = {REAL(0.0), 0};
+    if (sigma >= ON_THRESHOLD) {
+        command.engine_on = 1;
+        command.p_eng_w = state->old_p_eng_w[state->old_age] / real_min(sigma, REAL(1.0));
+    }
+    return command;
+}
+
+int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out)
+{
+    static const mpc_out nothing = {REAL(0.0), REAL(0.0), REAL(0.0), 0, MPC_RULES, 0, 0};
+    *out = nothing;
+    if (check_measured(&state->good, in) == 0) {
+        out->flags |= MPC_BAD_MEASUREMENT;
+    }
+    if (check_preview(in) == 0) {
+        out->flags |= MPC_BAD_PREVIEW;
+    }
+    /* the rules watch every second, so that their memory is right if they have to take over */
+    mpc_command command = rules_decide(&state->rules, &state->good);
+    move_on(state);
+    if (out->flags == 0) {
+        out->iterations = MPC_ITERATIONS;
+        prepare(state, in);
+        admm_iterate(state, MPC_ITERATIONS);
+        if (conclude(state) == 0) {
+            out->flags |= MPC_SOLVER_FAILED;
+        } else if (state->solves < MPC_WARM_UP_STEPS) {
+            out->flags |= MPC_WARMING_UP;
+        } else {
+            keep_plan(state);
+            out->sigma = state->stage[0].x[VAR_ON];
+            out->relaxation_gap = qp_relaxation_gap(&state->stage[0]);
+        }
+    }
+    if ((state->old_age <= MPC_PLAN_VALID_STEPS) && (state->old_age < MPC_SHORT)) {
+        out->rung = (state->old_age == 0) ? MPC_OPTIMISED : MPC_SHIFTED_PLAN;
+        command = safety_admissible(realise(state), &state->good);
+    }
+    out->engine_on = command.engine_on;
+    out->p_eng_w = command.p_eng_w;
+    return out->flags;
+}
+
+void mpc_plan(const mpc_state *state, real_t *x, real_t *duals)
+{
+    static const int32_t order[MPC_VARS] = {VAR_SOC,  VAR_T_CL,     VAR_P_ENG, VAR_ON,
+                                            VAR_FUEL, VAR_INTERNAL, VAR_SLACK};
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
+        const mpc_stage *const stage = &state->stage[k];
+        const int32_t in_si = (state->phase == PHASE_DEPARTING) ? 0 : 1;
+        for (int32_t i = 0; i < MPC_VARS; i++) {
+            const real_t unit = (in_si != 0) ? REAL(1.0) : stage->column[order[i]];
+            x[(k * MPC_VARS) + i] = stage->x[order[i]] * unit;
+        }
+        for (int32_t i = 0; i < MPC_ROWS; i++) {
+            const real_t unit = (in_si != 0) ? REAL(1.0) : (stage->row[i] / state->cost);
+            duals[(k * MPC_ROWS) + i] = stage->y[i] * unit;
+        }
+    }
+}
+
+int32_t mpc_abi(int32_t entry)
+{
+    static const int32_t entries[MPC_ABI_ENTRIES] = {
+        MPC_ABI_VERSION,
+        (int32_t)sizeof(real_t),
+        (int32_t)sizeof(mpc_in),
+        (int32_t)sizeof(mpc_out),
+        (int32_t)sizeof(mpc_state),
+        MPC_SHORT,
+        MPC_LONG,
+        MPC_VARS,
+        MPC_ROWS,
+        MPC_ITERATIONS,
+        (int32_t)offsetof(mpc_in, short_count),
+        (int32_t)offsetof(mpc_out, engine_on)};
+    return ((entry >= 0) && (entry < MPC_ABI_ENTRIES)) ? entries[entry] : -1;
+}
