@@ -8,6 +8,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from qpmpc import __version__
+from qpmpc.cli.benchmark import benchmark
 from qpmpc.cli.compare import compare
 from qpmpc.cli.cycles import cycles
 from qpmpc.cli.simulate import simulate
@@ -28,6 +29,7 @@ app = typer.Typer(
 )
 app.command()(simulate)
 app.command()(compare)
+app.command()(benchmark)
 app.command()(cycles)
 app.command()(vehicles)
 

@@ -1,0 +1,55 @@
+"""``qpmpc benchmark``: accuracy against speed, rivals included."""
+
+from typing import Annotated
+
+import typer
+
+from qpmpc.cli.options import JsonOption, OutOption, VehicleOption
+
+CYCLES = ("nycc", "nedc-truncated")
+
+
+def benchmark(
+    vehicle: VehicleOption = "prius-nimh",
+    json_file: JsonOption = None,
+    out: OutOption = None,
+    quick: Annotated[bool, typer.Option("--quick", help="NYCC only, and few candidates.")] = False,
+) -> None:
+    """Let solvers and settings drive whole cycles: fuel above DP against time a step.
+
+    With --out: pictures, figures, the recorded QPs (npz) and an HTML report.
+
+    For example:
+
+      qpmpc benchmark --quick
+
+      qpmpc benchmark --out results/benchmark
+    """
+    from qpmpc.cli.console import progress_bar, result_console, write_json
+    from qpmpc.cli.inputs import check_outputs, load_vehicle_and_settings
+    from qpmpc.cycles import load_cycle
+    from qpmpc.files import write_bytes
+    from qpmpc.verification.benchmark.benchmark import benchmark as run
+    from qpmpc.verification.benchmark.candidates import candidates
+    from qpmpc.verification.benchmark.table import benchmark_table
+
+    car, _ = load_vehicle_and_settings(vehicle, None)
+    check_outputs(json_file, out)
+    trips = [load_cycle(name) for name in (CYCLES[:1] if quick else CYCLES)]
+    chosen = candidates()
+    if quick:
+        chosen = tuple(c for c in chosen if c.label in {"osqp K=25", "osqp K=50", "piqp"})
+    with progress_bar(len(trips) * (len(chosen) + 1) + 1) as bar:
+        result = run(trips, car, chosen, bar.next_job)
+    write_json(result.as_data(), json_file)
+    console = result_console(json_file)
+    console.print(benchmark_table(result.rows))
+    if out is not None:
+        from qpmpc.verification.benchmark.export import recorded_npz
+        from qpmpc.verification.benchmark.report import write_benchmark
+        from qpmpc.verification.recorder import record
+
+        write_benchmark(result, car, out)
+        for trip in trips:
+            write_bytes(out / f"qps_{trip.name}.npz", recorded_npz(record(trip, car)))
+        console.print(f"{out / 'benchmark.html'} written, with pictures, JSON and recorded QPs")

@@ -1,0 +1,89 @@
+"""The benchmark: honest rows, a usable export, a self-contained report."""
+
+import json
+from io import BytesIO
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from qpmpc.cycles import Cycle, load_cycle
+from qpmpc.solvers.osqp import Osqp, OsqpSettings
+from qpmpc.vehicle import load_vehicle
+from qpmpc.verification.benchmark.benchmark import Benchmark
+from qpmpc.verification.benchmark.candidates import Candidate, candidates
+from qpmpc.verification.benchmark.drive import drive
+from qpmpc.verification.benchmark.export import recorded_npz
+from qpmpc.verification.benchmark.report import write_benchmark
+from qpmpc.verification.benchmark.table import benchmark_table
+from qpmpc.verification.recorder import record
+
+VEHICLE = load_vehicle()
+
+
+@pytest.fixture(scope="module")
+def short():
+    nycc = load_cycle("nycc")
+    return Cycle("short", np.arange(61.0), nycc.speed_mps[60:121], np.zeros(61))
+
+
+@pytest.fixture(scope="module")
+def driven(short):
+    return drive(
+        Candidate("osqp K=20", "osqp, fixed K", {"mh_qp.osqp.iterations": 20}),
+        short,
+        VEHICLE,
+        repetitions=2,
+    )
+
+
+def test_every_step_of_every_repetition_is_timed_and_runs_k_iterations(driven, short):
+    assert driven.step_ms.shape == driven.solve_ms.shape == (2, short.steps)
+    assert np.all(driven.step_ms >= driven.solve_ms)
+    row = driven.row(dp_fuel_g=driven.run.fuel_soc_balanced_g / 1.05)
+    assert row["fuel_above_dp_percent"] == pytest.approx(5.0)
+    assert row["iterations_max"] == row["iterations_median"] == 20
+    assert row["step_time_ms"]["max"] >= row["step_time_ms"]["median"] > 0.0
+
+
+def test_a_rival_drives_with_its_own_answers(short):
+    rival = next(c for c in candidates() if c.label == "piqp")
+    row = drive(rival, short, VEHICLE, repetitions=1).row(1.0)
+    assert row["fallback_steps"] == 0
+    assert row["iterations_max"] < 200  # an interior-point method, not OSQP in disguise
+
+
+def test_exported_qps_are_the_controllers(short):
+    recording = record(short, VEHICLE)
+    with np.load(BytesIO(recorded_npz(recording))) as data:
+        steps, n = data["q"].shape
+        m = data["lower"].shape[1]
+        assert steps == short.steps
+        k = 17
+        a = sp.csc_matrix((data["a_data"][k], data["a_indices"], data["a_indptr"]), shape=(m, n))
+        # Solving the exported numbers from the exported start gives the next exported start.
+        qp = [q for q in recording.qps if q.z is not None][-steps:][k].data
+        np.testing.assert_array_equal(
+            recording.structure.matrix_of(qp.a_data).toarray(), a.toarray()
+        )
+        solver = Osqp(OsqpSettings())
+        solver.setup(recording.structure, qp)
+        solution = solver.solve(qp, data["z_start"][k], data["y_start"][k])
+        assert solution.usable
+        product = a @ solution.z
+        assert np.all(product <= data["upper"][k] + 0.1)
+        assert np.all(product >= data["lower"][k] - 0.1)
+
+
+def test_report_is_self_contained(driven, tmp_path):
+    growth = [{"stages": s, "update_ms": 0.1 * s, "solve_ms": 0.2 * s} for s in (5, 50)]
+    result = Benchmark([driven], [driven.row(5.0)], growth)
+    write_benchmark(result, VEHICLE, tmp_path)
+    page = (tmp_path / "benchmark.html").read_text("utf-8")
+    assert "http" not in page
+    assert "osqp K=20" in page
+    for name in ("pareto", "histogram", "growth"):
+        assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    stored = json.loads((tmp_path / "benchmark.json").read_text("utf-8"))
+    assert stored["runs"][0]["candidate"] == "osqp K=20"
+    assert benchmark_table(result.rows).row_count == 1

@@ -1,0 +1,1 @@
+"""Accuracy against speed: backends, iteration counts and formulations driving whole cycles."""

@@ -1,0 +1,80 @@
+"""The whole benchmark: candidates on cycles, growth, figures as plain data."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from qpmpc.cycles import Cycle
+from qpmpc.report.provenance import provenance
+from qpmpc.simulate import Progress
+from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.verification.benchmark.candidates import RIVAL_TOLERANCE, Candidate
+from qpmpc.verification.benchmark.drive import Drive, drive
+from qpmpc.verification.benchmark.growth import growth
+from qpmpc.verification.dynamic_programming import solve_dp
+
+REPETITIONS_OSQP, REPETITIONS_RIVAL = 3, 1
+Job = Callable[[str], Progress]
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """Results of a benchmark.
+
+    Attributes
+    ----------
+    drives : one a candidate and cycle
+    rows : their figures, in the same order
+    growth : a row a number of stages
+    """
+
+    drives: list[Drive]
+    rows: list[dict[str, Any]]
+    growth: list[dict[str, Any]]
+
+    def as_data(self) -> dict[str, Any]:
+        """Return everything as plain data, ready for JSON."""
+        return {
+            "runs": self.rows,
+            "growth": self.growth,
+            "rival_tolerance": RIVAL_TOLERANCE,
+            "repetitions": {"osqp": REPETITIONS_OSQP, "rivals": REPETITIONS_RIVAL},
+            "provenance": provenance(),
+        }
+
+
+def benchmark(
+    cycles: Sequence[Cycle], vehicle: Vehicle, chosen: Sequence[Candidate], next_job: Job
+) -> Benchmark:
+    """Let every candidate drive every cycle, one after the other in one process.
+
+    Parameters
+    ----------
+    chosen : candidates
+    next_job : announces a job and returns where it reports its progress; called
+        len(cycles) * (len(chosen) + 1) + 1 times
+    """
+    drives, rows = [], []
+    for cycle in cycles:
+        report = next_job(f"{cycle.name}, dynamic programming")
+        solution = solve_dp(cycle, vehicle, progress=_thousandths(report))
+        dp_fuel_g = float(solution.fuel_g.sum())
+        for candidate in chosen:
+            report = next_job(f"{cycle.name}, {candidate.label}")
+            repetitions = REPETITIONS_RIVAL if candidate.solver else REPETITIONS_OSQP
+            driven = drive(candidate, cycle, vehicle, repetitions, report)
+            drives.append(driven)
+            rows.append(driven.row(dp_fuel_g))
+    report = next_job("growth over stages")
+    grown = growth(vehicle)
+    report(1, 1)
+    return Benchmark(drives, rows, grown)
+
+
+def _thousandths(report: Progress) -> Callable[[float], None]:
+    """Turn a progress that counts steps into one that takes a fraction."""
+
+    def say(fraction: float) -> None:
+        report(round(1000 * fraction), 1000)
+
+    return say

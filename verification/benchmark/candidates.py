@@ -1,0 +1,60 @@
+"""What is compared: OSQP at fixed iteration counts and settings, and rivals at a tolerance."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+
+from qpmpc.solvers.base import QpSolver
+from qpmpc.solvers.registry import make_solver, solver_names
+
+ITERATIONS = (10, 15, 25, 35, 50, 100, 200, 400)
+RHOS = (0.01, 0.03, 0.3, 1.0)
+RIVAL_TOLERANCE = 1e-5
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One way to solve the controller's QPs.
+
+    Attributes
+    ----------
+    label : as it stands in tables
+    family : what it is a member of, for colours and legends
+    overrides : dotted settings of the controller
+    solver : makes the backend; OSQP with the settings' own values if None
+    controller : name of the controller whose settings are used
+    """
+
+    label: str
+    family: str
+    overrides: dict[str, object] = field(default_factory=dict)
+    solver: Callable[[], QpSolver] | None = None
+    controller: str = "mh-qp"
+
+
+def candidates() -> tuple[Candidate, ...]:
+    """Return all candidates that can run with the packages installed here."""
+    found = [
+        Candidate(f"osqp K={k}", "osqp, fixed K", {"mh_qp.osqp.iterations": k}) for k in ITERATIONS
+    ]
+    found += [
+        Candidate(f"osqp rho={rho:g}", "osqp, other rho", {"mh_qp.osqp.rho": rho}) for rho in RHOS
+    ]
+    found += [
+        Candidate(label, "osqp, other scaling", {"mh_qp.scaling.duration_exponent": exponent})
+        for label, exponent in (("osqp, plain rates", 0.0), ("osqp, energies", 1.0))
+    ]
+    found.append(Candidate("osqp, paper's grid", "paper's grid", controller="mh-qp-paper"))
+    found += [_rival(name) for name in solver_names() if name != "osqp" and _installed(name)]
+    return tuple(found)
+
+
+def _rival(name: str) -> Candidate:
+    return Candidate(name, "rivals", solver=lambda: make_solver(name, RIVAL_TOLERANCE))
+
+
+_MODULES = {"proxqp": "proxsuite", "highs": "highspy"}
+
+
+def _installed(name: str) -> bool:
+    return find_spec(_MODULES.get(name, name)) is not None

@@ -1,0 +1,42 @@
+"""Files of a benchmark: JSON, pictures, one self-contained HTML page."""
+
+from base64 import b64encode
+from importlib.resources import files
+from pathlib import Path
+
+from jinja2 import Environment, StrictUndefined
+
+from qpmpc.files import json_text, write_bytes, write_text
+from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.verification.benchmark.benchmark import Benchmark
+from qpmpc.verification.benchmark.candidates import RIVAL_TOLERANCE
+from qpmpc.verification.benchmark.pictures import draw_growth, draw_histogram, draw_pareto
+
+IN_HISTOGRAM = ("osqp K=50", "osqp K=25", "piqp", "clarabel", "osqp, paper's grid")
+
+
+def write_benchmark(result: Benchmark, vehicle: Vehicle, folder: Path) -> None:
+    """Write benchmark.json, three pictures and benchmark.html."""
+    first = result.rows[0]["cycle"]
+    shown = [d for d in result.drives if d.run.cycle == first and d.candidate.label in IN_HISTOGRAM]
+    pictures = {
+        "pareto": draw_pareto(result.rows),
+        "histogram": draw_histogram(shown or result.drives[:1]),
+        "growth": draw_growth(result.growth),
+    }
+    for name, picture in pictures.items():
+        write_bytes(folder / f"{name}.png", picture)
+    data = result.as_data()
+    write_text(folder / "benchmark.json", json_text(data))
+    template = files("qpmpc.verification.benchmark").joinpath("benchmark.html.j2")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    cycles = dict.fromkeys(row["cycle"] for row in result.rows)
+    page = environment.from_string(template.read_text("utf-8")).render(
+        vehicle=vehicle,
+        tolerance=f"{RIVAL_TOLERANCE:g}",
+        cycles={c: [row for row in result.rows if row["cycle"] == c] for c in cycles},
+        repetitions=data["repetitions"],
+        provenance=data["provenance"],
+        **{name: b64encode(picture).decode() for name, picture in pictures.items()},
+    )
+    write_text(folder / "benchmark.html", page)
