@@ -131,6 +131,7 @@ def values_of(
         "soc_grid": _array(grid),
         "open_circuit_v": _array(vehicle.battery.open_circuit_v),
         "resistance_charge_ohm": _array(vehicle.battery.resistance_charge_ohm),
+        "resistance_discharge_ohm": _array(vehicle.battery.resistance_discharge_ohm),
         "fuel_g_per_s": line.fuel_g_per_s,
     }
     return Values(
@@ -190,6 +191,7 @@ def _problem(vehicle: Vehicle, model: PwaModel, settings: MhQpSettings) -> dict[
     battery, thermal, soc_init = vehicle.battery, vehicle.thermal, vehicle.trip.soc_init
     return {
         "battery_energy_j": model.battery_energy_j,
+        "soc_reserve": qp.soc_reserve * max(soc_init - battery.soc_min, 0.0),
         "terminal_soc_low": max(qp.terminal_low * soc_init, battery.soc_min),
         "terminal_soc_high": min(qp.terminal_high * soc_init, battery.soc_max),
         "soc_penalty_g": qp.soc_penalty_g,

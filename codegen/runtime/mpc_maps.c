@@ -44,6 +44,18 @@ real_t map_charge_limit_w(real_t soc)
     return real_min(mpc_par.battery_charge_max_w, current * voltage);
 }
 
+/* min(P_dis, I (U - R I)) with the current I that empties the battery to soc_min in a second */
+real_t map_discharge_limit_w(real_t soc)
+{
+    const real_t voltage = at_soc(mpc_par.open_circuit_v, soc);
+    const real_t resistance = at_soc(mpc_par.resistance_discharge_ohm, soc);
+    const real_t most = voltage / (REAL(2.0) * resistance); /* beyond it, power falls */
+    const real_t emptying = real_max(soc - mpc_par.soc_min, REAL(0.0)) * mpc_par.charge_c;
+    const real_t current = real_min(emptying, most);
+    return real_min(mpc_par.battery_discharge_max_w,
+                    current * (voltage - (resistance * current)));
+}
+
 real_t map_cabin_w(real_t t_cl_degc)
 {
     const real_t span = mpc_par.cabin_heat_full_degc - mpc_par.cabin_heat_from_degc;

@@ -45,6 +45,7 @@ typedef struct {
     real_t soc_grid[MPC_SOC_POINTS];
     real_t open_circuit_v[MPC_SOC_POINTS];
     real_t resistance_charge_ohm[MPC_SOC_POINTS];
+    real_t resistance_discharge_ohm[MPC_SOC_POINTS];
     real_t charge_c;
     real_t battery_discharge_max_w;
     real_t battery_charge_max_w;
@@ -57,6 +58,7 @@ typedef struct {
     real_t plan_resistance_discharge_ohm;
     real_t plan_resistance_charge_ohm;
     /* problem */
+    real_t soc_reserve;      /* of stages of more than 1 s, above soc_min */
     real_t terminal_soc_low; /* terminal band, already within soc_min..soc_max */
     real_t terminal_soc_high;
     real_t soc_penalty_g; /* quadratic terminal cost instead of the band, where above 0 */

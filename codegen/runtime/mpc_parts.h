@@ -13,6 +13,7 @@ typedef struct {
 real_t map_fuel_g_per_s(real_t p_eng_w);
 real_t map_cold_factor(real_t t_cl_degc);
 real_t map_charge_limit_w(real_t soc);
+real_t map_discharge_limit_w(real_t soc);
 real_t map_cabin_w(real_t t_cl_degc);
 real_t map_cooling_w(real_t t_cl_degc, real_t speed_mps);
 real_t map_planned_internal_w(real_t power_w);

@@ -12,6 +12,7 @@
 #define SHORTEST_SCALE_S REAL(1.0)
 #define ROW_GAP_K REAL(1.0e-2) /* even a masked coolant row keeps two bounds */
 #define REACH_MARGIN_SOC REAL(1.0e-5)
+#define ACCURATE_STAGE_S REAL(1.0) /* a longer stage is forecast */
 #define SIGMA_FORCED REAL(0.99)
 #define COLDEST_DEGC REAL(0.0) /* where a linearisation point may lie */
 #define HOTTEST_DEGC REAL(100.0)
@@ -157,7 +158,9 @@ static real_t fill_soc_rows(mpc_stage *stage, int32_t is_first, real_t soc, real
     stage->b.soc = (is_first != 0) ? (soc * stage->row[ROW_SOC]) : REAL(0.0);
     const real_t factor = REAL(1.0) / stage->column[VAR_SOC];
     stage->row[ROW_BOX_SOC] = factor;
-    stage->b.soc_low = real_min(mpc_par.soc_min, reached - REACH_MARGIN_SOC) * factor;
+    const real_t reserve =
+        (stage->duration_s > ACCURATE_STAGE_S) ? mpc_par.soc_reserve : REAL(0.0);
+    stage->b.soc_low = real_min(mpc_par.soc_min + reserve, reached - REACH_MARGIN_SOC) * factor;
     stage->b.soc_high = mpc_par.soc_max * factor;
     return reached;
 }

@@ -7,7 +7,7 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-#define SOC_MARGIN REAL(0.002)    /* a second of full power moves SOC by less */
+#define SOC_MARGIN REAL(1e-5)     /* kept from the lower limit; a second's effect is known */
 #define T_CL_MARGIN_K REAL(0.02)  /* kept from the upper limit */
 #define T_CL_COOLING_K REAL(0.15) /* a second of engine off cools by less */
 #define T_CL_NEAR_K REAL(2.0)     /* no second warms by more */
@@ -44,9 +44,7 @@ static real_t cooling_limit_w(const mpc_measured *seen)
 mpc_command safety_admissible(mpc_command wish, const mpc_measured *seen)
 {
     const real_t net_w = seen->demand_w + mpc_par.aux_power_w;
-    const real_t give_w = (seen->soc < (mpc_par.soc_min + SOC_MARGIN))
-                              ? REAL(0.0)
-                              : mpc_par.battery_discharge_max_w;
+    const real_t give_w = map_discharge_limit_w(seen->soc - SOC_MARGIN);
     /* below `low` the battery gives too much, above `high` it takes too much */
     const real_t low = real_max(net_w - give_w, REAL(0.0));
     const real_t high = real_min(net_w + map_charge_limit_w(seen->soc), mpc_par.engine_max_w);

@@ -4,7 +4,7 @@ from qpmpc.controllers.base import Observation
 from qpmpc.vehicle.engine import alpha_at
 from qpmpc.vehicle.plant import Command, Plant
 
-SOC_MARGIN = 0.002  # a step of full power moves SOC by less than this
+SOC_MARGIN = 1e-5  # kept from the lower limit; what a step leads to is known exactly there
 T_CL_MARGIN_K = 0.02  # kept from the upper limit; what a step leads to is known exactly there
 T_CL_COOLING_K = 0.15  # a step of engine off cools the coolant by less than this
 T_CL_NEAR_K = 2.0  # no step warms the coolant by more than this
@@ -50,11 +50,9 @@ class SafetyLayer:
 
     def _battery_range_w(self, soc: float) -> tuple[float, float]:
         """Terminal power the battery may take and give in the next second."""
-        battery = self._vehicle.battery
-        most = battery.power_discharge_max_w
-        if soc < battery.soc_min + SOC_MARGIN:
-            most = 0.0
-        return -self._plant.battery.charge_limit_w(soc, self._plant.step_s), most
+        battery, step_s = self._plant.battery, self._plant.step_s
+        most = battery.discharge_limit_w(soc - SOC_MARGIN, step_s)
+        return -battery.charge_limit_w(soc, step_s), most
 
     def _too_cold(self, seen: Observation) -> bool:
         """Whether a second with the engine off would reach the lower coolant limit."""

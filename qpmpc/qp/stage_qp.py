@@ -20,6 +20,7 @@ SHORTEST_SCALE_S = 1.0  # a masked stage is scaled as one of 1 s
 T_CL_MAX_MARGIN_K = 0.05  # small: the radiator is fully open only at the limit itself
 ROW_GAP = 1e-2  # K; even a masked coolant row keeps two bounds, so no row turns into an equality
 REACH_MARGIN_SOC = 1e-5
+ACCURATE_STAGE_S = 1.0  # a stage of this length or less is known, a longer one is forecast
 SIGMA_FORCED = 0.99  # "engine must be on" as a lower bound on sigma, kept apart from the upper one
 
 
@@ -30,6 +31,8 @@ class QpSettings(BaseModel):
     ----------
     terminal_low, terminal_high : terminal SOC band as multiples of the initial SOC (paper eq. 11)
     soc_penalty_g : lambda of a quadratic terminal cost, g per (unit SOC)^2, instead of the band
+    soc_reserve : share of the room between the lower SOC limit and the initial SOC that stages of
+        more than 1 s are planned to leave, for what the forecast does not foretell
     t_cl_margin_k : the coolant is planned to stay this far above its lower limit
     slack_g_per_k : price of a coolant limit exceeded, g per K and stage
     regularisation : quadratic cost on rates and slack in solver units, far below any fuel
@@ -40,6 +43,7 @@ class QpSettings(BaseModel):
     terminal_low: Annotated[float, Field(gt=0.0, le=1.5)] = 1.0
     terminal_high: Annotated[float, Field(gt=0.0, le=1.5)] = 1.01
     soc_penalty_g: Annotated[float, Field(ge=0.0)] = 0.0
+    soc_reserve: Annotated[float, Field(ge=0.0, le=0.9)] = 0.5
     t_cl_margin_k: Annotated[float, Field(ge=0.0, le=10.0)] = 0.5
     slack_g_per_k: Weight = 5.0
     regularisation: Annotated[float, Field(ge=0.0, le=1.0)] = 1e-5
@@ -170,6 +174,12 @@ class StageQp:
         lower[:, rows.box_slack] = 0.0
         return lower, upper
 
+    @property
+    def soc_reserve(self) -> float:
+        """Reserve of forecast stages above the lower SOC limit, in SOC."""
+        room = self.vehicle.trip.soc_init - self.vehicle.battery.soc_min
+        return self.settings.soc_reserve * max(room, 0.0)
+
     def _terminal(self, multiple: float) -> float:
         return multiple * self.vehicle.trip.soc_init
 
@@ -185,7 +195,7 @@ class StageQp:
             np.multiply.outer(net, pieces.slope) + pieces.intercept - off_w[:, None]
         )
         self._lower[:, rows.battery] = off_w[:, None]
-        low = np.full(self.stages, battery.soc_min)
+        low = battery.soc_min + np.where(h > ACCURATE_STAGE_S, self.soc_reserve, 0.0)
         if not self.settings.soc_penalty_g:
             low[-1] = max(self._terminal(self.settings.terminal_low), battery.soc_min)
         self._lower[:, rows.box_soc] = np.minimum(low, self._reachable_soc(stages, soc))

@@ -22,8 +22,9 @@ class BatteryMaps:
         self.discharge = Table(battery.soc_grid, battery.resistance_discharge_ohm)
         self.charge = Table(battery.soc_grid, battery.resistance_charge_ohm)
         self.charge_c = 3600.0 * battery.capacity_ah
-        self._soc_max = battery.soc_max
+        self._soc_min, self._soc_max = battery.soc_min, battery.soc_max
         self._power_charge_max_w = battery.power_charge_max_w
+        self._power_discharge_max_w = battery.power_discharge_max_w
 
     def energy_j(self, soc: float) -> float:
         """Energy of a unit of SOC about `soc`: U_oc(soc) times the capacity, in J."""
@@ -48,6 +49,17 @@ class BatteryMaps:
         current = max(self._soc_max - soc, 0.0) * self.charge_c / duration_s
         filling = current * (self.open_circuit.at(soc) + self.charge.at(soc) * current)
         return min(self._power_charge_max_w, filling)
+
+    def discharge_limit_w(self, soc: float, duration_s: float) -> float:
+        """Most power the battery may give: its limit, or what just empties it to soc_min.
+
+        min(P_dis, I (U - R I)) with I = (soc - soc_min) C_bat / duration, never negative.
+        """
+        current = max(soc - self._soc_min, 0.0) * self.charge_c / duration_s
+        voltage, resistance = self.open_circuit.at(soc), self.discharge.at(soc)
+        current = min(current, voltage / (2.0 * resistance))  # beyond it, power falls
+        emptying = current * (voltage - resistance * current)
+        return min(self._power_discharge_max_w, emptying)
 
     def internal_power_w(self, soc: ArrayLike, power_w: ArrayLike) -> NDArray[np.float64]:
         """Power drawn from the store, G = U_oc I = P + R I^2, for arrays.

@@ -31,19 +31,22 @@ def test_any_wish_becomes_an_admissible_command(on, p_eng_w, soc, t_cl_degc, dem
     # Within what engine and battery can give together, no power limit is exceeded.
     battery = PLANT.vehicle.battery
     reach = PLANT.vehicle.engine.power_max_w
-    if soc >= battery.soc_min + 0.002:
+    if soc >= battery.soc_min + 0.01:  # a second of full power takes some 0.006
         reach += battery.power_discharge_max_w
     if demand_w + battery.aux_power_w <= reach and soc < battery.soc_max - 0.01:
         _, flows = PLANT.step(PlantState(soc, t_cl_degc), command, demand_w, speed_mps)
         assert flows.power_excess_w == 0.0
 
 
-@given(demand_w=st.floats(-20e3, 60e3), soc=st.floats(0.4, 0.402), p=st.floats(0.0, 71e3))
-def test_an_empty_battery_is_not_discharged(demand_w, soc, p):
+@given(demand_w=st.floats(-20e3, 70e3), soc=st.floats(0.4, 0.43), p=st.floats(0.0, 71e3))
+def test_the_battery_is_not_emptied_beyond_its_limit(demand_w, soc, p):
     seen = Observation(0, soc, 50.0, False, demand_w, 10.0)
     command = SAFETY.admissible(Command(False, p), seen)
-    after, _ = PLANT.step(PlantState(soc, 50.0), command, demand_w, 10.0)
-    assert after.soc >= soc - 1e-12
+    after, flows = PLANT.step(PlantState(soc, 50.0), command, demand_w, 10.0)
+    assert after.soc >= 0.4
+    # and what it holds above the limit is given: the engine adds no more than is missing
+    if not p and command.engine_on and flows.p_bat_w < 26e3:
+        assert after.soc <= 0.4 + 2e-5
 
 
 @given(demand_w=st.floats(-20e3, 20e3), speed_mps=st.floats(0.0, 35.0))

@@ -162,3 +162,17 @@ def test_scaling_leads_back():
     y = rng.normal(size=scaling.row.shape)
     np.testing.assert_allclose(scaling.primal(scaling.solver_primal(x)), x)
     np.testing.assert_allclose(scaling.dual(scaling.solver_dual(y)), y)
+
+
+def test_forecast_stages_keep_a_reserve_of_charge_and_known_ones_do_not():
+    qp = _qp()
+    stages = BUILDER.at(0)
+    data = qp.update(stages, 0.6, 60.0, _about())
+    lower = (data.lower / data.scaling.row).reshape(qp.stages, -1)
+    planned = lower[:, qp.rows.box_soc]
+    battery, trip = VEHICLE.battery, VEHICLE.trip
+    reserved = battery.soc_min + 0.5 * (trip.soc_init - battery.soc_min)
+    assert planned[:-1] == pytest.approx(
+        np.where(stages.duration_s[:-1] > 1.0, reserved, battery.soc_min)
+    )
+    assert planned[-1] == pytest.approx(trip.soc_init)
