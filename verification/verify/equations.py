@@ -1,0 +1,119 @@
+"""The plant's equations written a second time, from its parameters alone.
+
+The checks compare the product with these; nothing here calls the product's own maps.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from qpmpc.cycles import Cycle
+from qpmpc.vehicle.parameters import Vehicle
+
+Floats = NDArray[np.float64]
+
+SPEED_POINTS = 1681
+GRAVITY_MPS2 = 9.81
+
+
+class Equations:
+    """Maps and balances of one vehicle, for arrays.
+
+    Parameters
+    ----------
+    vehicle : parameters
+    """
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.vehicle = vehicle
+        self.lhv_j_per_g = vehicle.engine.lhv_j_per_kg / 1000.0
+        self.charge_c = vehicle.battery.capacity_ah * 3600.0
+
+    def demand_w(self, cycle: Cycle) -> Floats:
+        """P_d, eq. (2), from the speed at both ends of each second."""
+        car, v = self.vehicle.chassis, cycle.speed_mps
+        mean = (v[:-1] + v[1:]) / 2.0
+        grade = cycle.step_grade
+        force = (
+            np.where(mean > 0.0, car.road_load_a_n, 0.0)
+            + mean * (car.road_load_b_n_per_mps + car.road_load_c_n_per_mps2 * mean)
+            + car.mass_kg * car.rotating_mass_factor * (v[1:] - v[:-1])
+            + car.mass_kg * GRAVITY_MPS2 * np.sin(np.arctan(grade))
+        )
+        factor = np.where(force * mean < 0.0, car.eta_regen, 1.0 / car.eta_drive)
+        return np.asarray(force * mean * factor)
+
+    def net_w(self, cycle: Cycle) -> Floats:
+        """P0 = P_d + P_aux within what battery and engine can take and give."""
+        battery = self.vehicle.battery
+        net = self.demand_w(cycle) + battery.aux_power_w
+        net = np.maximum(net, -battery.power_charge_max_w)
+        return np.minimum(net, battery.power_discharge_max_w + self.vehicle.engine.power_max_w)
+
+    def fuel_g_per_s(self, power_w: ArrayLike) -> Floats:
+        """Fuel rate of the hot engine, on: least over speed within the torque limit; shape (m,)."""
+        engine = self.vehicle.engine
+        power = np.atleast_1d(np.asarray(power_w, dtype=float))
+        low = max(engine.friction_speed_rpm[0], engine.torque_speed_rpm[0])
+        high = min(engine.friction_speed_rpm[-1], engine.torque_speed_rpm[-1])
+        rpm = np.linspace(low, high, SPEED_POINTS)
+        torque = np.interp(rpm, engine.torque_speed_rpm, engine.torque_max_nm)
+        most_w = torque * rpm * np.pi / 30.0
+        # litres a second, times the friction work of a litre and revolution
+        swept = engine.displacement_l * rpm / 60.0
+        friction_w = (
+            1000.0 * swept * np.interp(rpm, engine.friction_speed_rpm, engine.friction_kj_per_rev_l)
+        )
+        needed = np.minimum(power, most_w.max())
+        friction = np.where(most_w >= needed[:, None], friction_w, np.inf).min(axis=1)
+        return np.asarray((friction + power / engine.indicated_efficiency) / self.lhv_j_per_g)
+
+    def alpha(self, t_cl_degc: ArrayLike) -> Floats:
+        """Cold multiplier."""
+        cold = self.vehicle.cold_engine
+        below = np.clip(cold.hot_degc - np.asarray(t_cl_degc, dtype=float), 0.0, None)
+        return np.asarray(1.0 + cold.k * np.power(below / cold.span_k, cold.exponent))
+
+    def voltage_v(self, soc: ArrayLike) -> Floats:
+        """U_oc."""
+        battery = self.vehicle.battery
+        return np.interp(soc, battery.soc_grid, battery.open_circuit_v)
+
+    def resistance_ohm(self, soc: ArrayLike, discharging: ArrayLike) -> Floats:
+        """R by direction."""
+        battery = self.vehicle.battery
+        give = np.interp(soc, battery.soc_grid, battery.resistance_discharge_ohm)
+        take = np.interp(soc, battery.soc_grid, battery.resistance_charge_ohm)
+        return np.where(discharging, give, take)
+
+    def terminal_w(self, soc: ArrayLike, current_a: ArrayLike) -> Floats:
+        """Terminal power of a current, U I - R I^2, discharge positive."""
+        current = np.asarray(current_a, dtype=float)
+        resistance = self.resistance_ohm(soc, current >= 0.0)
+        return np.asarray(current * (self.voltage_v(soc) - resistance * current))
+
+    def internal_w(self, soc: ArrayLike, power_w: ArrayLike) -> Floats:
+        """G = U I, with I the smaller root of R I^2 - U I + P = 0."""
+        power, voltage = np.asarray(power_w, dtype=float), self.voltage_v(soc)
+        resistance = self.resistance_ohm(soc, power >= 0.0)
+        ratio = 4.0 * resistance * power / voltage**2
+        # 2 P / (1 + root) is U I without the difference of nearly equal numbers
+        return np.asarray(2.0 * power / (1.0 + np.sqrt(np.maximum(1.0 - ratio, 0.0))))
+
+    def ua_w_per_k(self, speed_mps: ArrayLike) -> Floats:
+        """Conductance to the air."""
+        th = self.vehicle.thermal
+        return np.asarray(th.ua0_w_per_k + th.ua1_w_per_k_per_mps * np.asarray(speed_mps))
+
+    def cabin_w(self, t_cl_degc: ArrayLike) -> Floats:
+        """Heat to the cabin."""
+        th = self.vehicle.thermal
+        return np.interp(
+            t_cl_degc, [th.cabin_heat_from_degc, th.cabin_heat_full_degc], [0.0, th.cabin_heat_w]
+        )
+
+    def radiator_w(self, t_cl_degc: ArrayLike) -> Floats:
+        """Heat to the radiator."""
+        th, t = self.vehicle.thermal, np.asarray(t_cl_degc, dtype=float)
+        opens = th.thermostat_open_degc
+        share = np.interp(t, [opens, opens + th.thermostat_span_k], [0.0, 1.0])
+        return np.asarray(share * th.radiator_w_per_k * (t - th.t_amb_degc))
