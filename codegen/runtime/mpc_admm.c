@@ -41,15 +41,16 @@ void admm_start_cold(mpc_state *state)
     }
 }
 
-/* Short stages move up by one; the last keeps its values; long stages keep their place. */
-void admm_shift(mpc_state *state)
+/* Short stages move up by 0 or 1 (in equal time); the last keeps its values; long stages keep
+ * their place. */
+void admm_shift(mpc_state *state, int32_t by)
 {
     for (int32_t k = 0; k < (MPC_SHORT - 1); k++) {
         for (int32_t i = 0; i < MPC_VARS; i++) {
-            state->stage[k].x[i] = state->stage[k + 1].x[i];
+            state->stage[k].x[i] = state->stage[k + by].x[i];
         }
         for (int32_t i = 0; i < MPC_ROWS; i++) {
-            state->stage[k].y[i] = state->stage[k + 1].y[i];
+            state->stage[k].y[i] = state->stage[k + by].y[i];
         }
     }
 }

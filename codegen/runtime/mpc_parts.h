@@ -32,7 +32,7 @@ real_t qp_relaxation_gap(const mpc_stage *stage);
 void admm_start_cold(mpc_state *state);
 void admm_to_solver_units(mpc_state *state);
 void admm_to_si_units(mpc_state *state);
-void admm_shift(mpc_state *state);
+void admm_shift(mpc_state *state, int32_t by);
 void admm_factorise(mpc_state *state);
 void admm_iterate(mpc_state *state, int32_t count);
 int32_t admm_usable(const mpc_state *state);

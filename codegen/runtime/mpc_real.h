@@ -18,9 +18,16 @@
 #define REAL_ABS(x) fabs(x)
 #endif
 
-/* Of a NaN and a number, the number wins where it is the second argument. */
+/* Without branches, so that time does not depend on data. Of a NaN and a number as second argument
+ * the number wins. MPC_NATIVE_MINMAX, from the build, says that the processor has instructions for
+ * fmin and fmax (as the Cortex-M7's FPv5 has); elsewhere they are slow library calls. */
+#if defined(MPC_NATIVE_MINMAX) && MPC_F32
+static inline real_t real_min(real_t a, real_t b) { return fminf(a, b); }
+static inline real_t real_max(real_t a, real_t b) { return fmaxf(a, b); }
+#else
 static inline real_t real_min(real_t a, real_t b) { return (a < b) ? a : b; }
 static inline real_t real_max(real_t a, real_t b) { return (a > b) ? a : b; }
+#endif
 static inline real_t real_clip(real_t x, real_t low, real_t high)
 {
     return real_min(real_max(x, low), high);

@@ -99,9 +99,7 @@ static void move_on(mpc_state *state)
     if (state->phase == PHASE_DEPARTING) {
         (void)conclude(state); /* a departure cut short is a warm start like any other */
     }
-    if ((state->is_under_way != 0) && (state->phase == PHASE_RUNNING)) {
-        admm_shift(state);
-    }
+    admm_shift(state, state->is_under_way);
     if (state->old_age < MPC_NO_PLAN) {
         state->old_age++;
     }
