@@ -4,7 +4,7 @@ from importlib import import_module, resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,8 @@ Precision = Literal["f32", "f64"]
 Target = Literal["host", "cortex-m7"]
 PRECISIONS: tuple[Precision, ...] = ("f32", "f64")
 TARGETS: tuple[Target, ...] = ("host", "cortex-m7")
+
+Name = TypeVar("Name", bound=str)
 
 VALUES_A_LINE = 6
 _STRETCH = {
@@ -65,10 +67,8 @@ def project_files(
     InputError
         If target or precision is unknown.
     """
-    if target not in TARGETS:
-        raise InputError(f"unknown target {target!r}: use one of {', '.join(TARGETS)}")
-    if precision not in PRECISIONS:
-        raise InputError(f"unknown precision {precision!r}: use one of {', '.join(PRECISIONS)}")
+    one_of(target, TARGETS, "target")
+    one_of(precision, PRECISIONS, "precision")
     root = resources.files("qpmpc.codegen")
     files = {p.name: p.read_text("utf-8") for p in _sorted(root / "runtime")}
     if target == "cortex-m7":
@@ -93,6 +93,20 @@ def project_files(
         text = environment.get_template(template).render(**context, sources=dict.fromkeys(sources))
         files[output] = text
     return dict(sorted(files.items()))
+
+
+def one_of(name: str, names: tuple[Name, ...], what: str) -> Name:
+    """Return the name if it is one of the names.
+
+    Raises
+    ------
+    InputError
+        If it is not.
+    """
+    for known in names:
+        if name == known:
+            return known
+    raise InputError(f"unknown {what} {name!r}: use one of {', '.join(names)}")
 
 
 def _jinja2() -> ModuleType:

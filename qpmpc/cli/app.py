@@ -9,8 +9,10 @@ import typer
 
 from qpmpc import __version__
 from qpmpc.cli.benchmark import benchmark
+from qpmpc.cli.codegen import codegen
 from qpmpc.cli.compare import compare
 from qpmpc.cli.cycles import cycles
+from qpmpc.cli.pil import pil
 from qpmpc.cli.simulate import simulate
 from qpmpc.cli.vehicles import vehicles
 from qpmpc.errors import InputError, QpmpcError
@@ -30,6 +32,8 @@ app = typer.Typer(
 app.command()(simulate)
 app.command()(compare)
 app.command()(benchmark)
+app.command()(codegen)
+app.command()(pil)
 app.command()(cycles)
 app.command()(vehicles)
 

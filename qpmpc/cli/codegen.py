@@ -1,0 +1,55 @@
+"""``qpmpc codegen``: the whole controller as a C project."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from qpmpc.cli.options import SetOption, VehicleOption
+
+
+def codegen(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Folder of the project.", show_default=False)
+    ],
+    target: Annotated[
+        str,
+        typer.Option(metavar="TARGET", help="host (shared library) or cortex-m7 (firmware)."),
+    ] = "host",
+    precision: Annotated[str, typer.Option(metavar="f32|f64", help="Of all arithmetic.")] = "f32",
+    iterations: Annotated[
+        int | None,
+        typer.Option(
+            metavar="K", help="Solver iterations a step; as the controller's.", show_default=False
+        ),
+    ] = None,
+    vehicle: VehicleOption = "prius-nimh",
+    set_: SetOption = None,
+) -> None:
+    """Write the mh-qp controller as a C99 project: source, tables, README, licence, Makefile.
+
+    For example:
+
+      qpmpc codegen controller_c
+
+      qpmpc codegen firmware --target cortex-m7 --precision f32 --iterations 25
+    """
+    from qpmpc.cli.console import result_console
+    from qpmpc.cli.inputs import load_vehicle_and_settings
+    from qpmpc.codegen.generate import PRECISIONS, TARGETS, generate, one_of
+    from qpmpc.codegen.values import values_of
+
+    of_target = one_of(target, TARGETS, "target")
+    of_precision = one_of(precision, PRECISIONS, "precision")
+    overrides = list(set_ or [])
+    if iterations is not None:
+        overrides.append(f"mh_qp.osqp.iterations={iterations}")
+    car, settings = load_vehicle_and_settings(vehicle, overrides)
+    values = values_of(car, settings.mh_qp, settings.rule_based)
+    files = generate(values, folder, of_target, of_precision)
+    sizes = values.sizes
+    result_console().print(
+        f"{folder}: {len(files)} files written, target {target}, {precision}, {sizes.stages} "
+        f"stages, {values.iterations} iterations a step; start with README.md",
+        markup=False,
+    )
