@@ -35,9 +35,9 @@ def compare(
 
       qpmpc compare nycc nedc-truncated --out results
 
-      qpmpc compare nycc --controllers rule-based,mh-qp,dp --json -
+      qpmpc compare my_trip.csv --controllers rule-based,mh-qp,dp --json -
 
-      qpmpc compare my_trip.csv --vehicle my_car.toml --set trip.soc_init=0.55
+      qpmpc compare nycc --vehicle my_car.toml --set trip.soc_init=0.55
     """
     from qpmpc.cli.console import progress_bar, result_console, write_json
     from qpmpc.cli.inputs import check_outputs, load_vehicle_and_settings
