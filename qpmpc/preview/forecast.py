@@ -46,10 +46,14 @@ class Trace:
         return np.clip(net, -battery.power_charge_max_w, most)
 
     def internal_off_w(self, vehicle: Vehicle) -> NDArray[np.float64]:
-        """Internal battery power with the engine off, l(P0), W, shape (steps,).
+        """Internal battery power of each step with the engine off, l(P0), W, shape (steps,)."""
+        return internal_off_w(vehicle, self.battery_side_w(vehicle))
 
-        At the trip's initial SOC; where the battery alone cannot meet P0, at its limit.
-        """
-        battery = vehicle.battery
-        power = np.minimum(self.battery_side_w(vehicle), battery.power_discharge_max_w)
-        return BatteryMaps(battery).internal_power_w(vehicle.trip.soc_init, power)
+
+def internal_off_w(vehicle: Vehicle, net_w: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Internal battery power when it alone meets P0, l(P0), W; same shape.
+
+    At the trip's initial SOC; beyond the discharge limit, at that limit.
+    """
+    power = np.minimum(net_w, vehicle.battery.power_discharge_max_w)
+    return BatteryMaps(vehicle.battery).internal_power_w(vehicle.trip.soc_init, power)

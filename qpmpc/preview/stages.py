@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from qpmpc.preview.forecast import Trace
+from qpmpc.preview.forecast import Trace, internal_off_w
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.vehicle.parameters import Vehicle
 
@@ -24,7 +24,7 @@ class Stages:
     net_w : P0 = P_d + P_aux, mean over the stage
     speed_mps : mean speed
     internal_off_w : mean of the internal battery power l(P0) with the engine off; by convexity
-        more than l of the mean
+        more than l of the mean, which is all that an averaged preview (one class) has
     """
 
     duration_s: NDArray[np.float64]
@@ -58,6 +58,7 @@ class StageBuilder:
         self, vehicle: Vehicle, truth: Trace, forecast: Trace, settings: HorizonSettings
     ) -> None:
         self.settings = settings
+        self._vehicle = vehicle
         self.steps = truth.steps
         self._short = _fields(truth, vehicle)
         demand_class = _demand_class(forecast.demand_w, settings)
@@ -82,6 +83,8 @@ class StageBuilder:
         fields[0, n_short:] = duration
         fields[1:, n_short:] = sums[:, 1:].transpose(1, 2, 0).reshape(FIELDS - 1, -1)
         fields[1:, n_short:] /= np.maximum(duration, 1.0)
+        if self.settings.classes == 1:  # an averaged preview knows no more than the mean demand
+            fields[3, n_short:] = internal_off_w(self._vehicle, fields[1, n_short:])
         return Stages(*fields)
 
     def shift(self) -> NDArray[np.intp]:

@@ -29,7 +29,11 @@ def test_time_energy_and_distance_ahead_are_conserved(step, short, blocks, class
     assert stages.duration_s.sum() == pytest.approx(NYCC.steps - step)
     assert stages.duration_s @ stages.net_w == pytest.approx(net.sum(), abs=1e-3)
     internal = NYCC.internal_off_w(VEHICLE)[step:].sum()
-    assert stages.duration_s @ stages.internal_off_w == pytest.approx(internal, abs=1e-3)
+    planned = stages.duration_s @ stages.internal_off_w
+    if classes == 3:
+        assert planned == pytest.approx(internal, abs=1e-3)
+    else:  # averaging hides losses: the loss curve is convex
+        assert planned <= internal + 1e-3
     ahead = NYCC.speed_mps[step:].sum()
     assert stages.duration_s @ stages.speed_mps == pytest.approx(ahead, abs=1e-6)
     assert np.all(stages.duration_s >= 0.0)
