@@ -12,33 +12,35 @@
  * and is factorised stage by stage: L D L' with seven variables a stage, in the order in which
  * they stand in `x`, which leaves few entries.
  */
+#include <stddef.h>
+
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
 #define LARGEST_PLAUSIBLE REAL(1.0e6)
 #define UNLIMITED REAL(1.0e30)
-#define NEXT(stage) ((stage) + 1)
-#define BEFORE(stage) ((stage) - 1)
 
 /* What stands before the first stage. */
-static const real_t nothing[MPC_VARS] = {REAL(0.0)};
+static const real_t nothing[MPC_VARS] = {REAL(0.0), REAL(0.0), REAL(0.0), REAL(0.0),
+                                         REAL(0.0), REAL(0.0), REAL(0.0)};
 
 /* Indices within the dense part of a factor. */
 enum { IN_INTERNAL = 0, IN_FUEL = 1, IN_P_ENG = 2, IN_SOC = 3, IN_T_CL = 4 };
 
-void admm_start_cold(mpc_state *state)
+/* A start at nothing: all variables 0, SOC and coolant temperature too. */
+void admm_clear(mpc_state *state)
 {
     for (int32_t k = 0; k < MPC_STAGES; k++) {
-        mpc_stage *const stage = &state->stage[k];
         for (int32_t i = 0; i < MPC_VARS; i++) {
-            stage->x[i] = REAL(0.0);
+            state->stage[k].x[i] = REAL(0.0);
         }
         for (int32_t i = 0; i < MPC_ROWS; i++) {
-            stage->z[i] = REAL(0.0);
-            stage->y[i] = REAL(0.0);
+            state->stage[k].y[i] = REAL(0.0);
         }
     }
+    state->origin_soc = REAL(0.0);
+    state->origin_t_degc = REAL(0.0);
 }
 
 /* Short stages move up by 0 or 1 (in equal time); the last keeps its values; long stages keep
@@ -91,7 +93,7 @@ void admm_to_solver_units(mpc_state *state)
         for (int32_t i = 0; i < MPC_ROWS; i++) {
             stage->y[i] *= state->cost / stage->row[i];
         }
-        multiply(stage, stage->x, (k > 0) ? BEFORE(stage)->x : nothing, stage->z);
+        multiply(stage, stage->x, (k > 0) ? state->stage[k - 1].x : nothing, stage->z);
     }
 }
 
@@ -127,8 +129,12 @@ int32_t admm_usable(const mpc_state *state)
 
 /* Entries of the matrix in the rows of slack and on, and the lower triangle of the others. */
 typedef struct {
-    real_t slack, slack_t;
-    real_t on, on_internal, on_fuel, on_p_eng;
+    real_t slack;
+    real_t slack_t;
+    real_t on;
+    real_t on_internal;
+    real_t on_fuel;
+    real_t on_p_eng;
     real_t dense[COUPLED_COUNT][COUPLED_COUNT];
 } stage_normal;
 
@@ -197,10 +203,9 @@ static void assemble(const mpc_stage *stage, stage_normal *m)
 }
 
 /* Eliminate SOC and T_cl of the stage before from this one. */
-static void eliminate_before(mpc_stage *stage, stage_normal *m)
+static void eliminate_before(mpc_stage *stage, const stage_factor *before, stage_normal *m)
 {
     const stage_matrix *const a = &stage->a;
-    const stage_factor *const before = &BEFORE(stage)->factor;
     const real_t strong = mpc_par.rho_equality * a->soc[1];
     const real_t weak = mpc_par.rho * a->t_cl[1];
     const real_t t_soc = before->dense[IN_T_CL][IN_SOC];
@@ -256,19 +261,19 @@ void admm_factorise(mpc_state *state)
         stage_normal m;
         assemble(stage, &m);
         if (k < (MPC_STAGES - 1)) {
-            const stage_matrix *const next = &NEXT(stage)->a;
+            const stage_matrix *const next = &state->stage[k + 1].a;
             m.dense[IN_SOC][IN_SOC] += mpc_par.rho_equality * next->soc[1] * next->soc[1];
             m.dense[IN_T_CL][IN_T_CL] += mpc_par.rho * next->t_cl[1] * next->t_cl[1];
         }
         if (k > 0) {
-            eliminate_before(stage, &m);
+            eliminate_before(stage, &state->stage[k - 1].factor, &m);
         }
         factorise_stage(stage, &m);
     }
 }
 
 /* work = sigma x - q + A'(Rz - y), rows of this stage; what they add to the stage before too */
-static void right_hand_side(mpc_stage *stage, int32_t has_before)
+static void right_hand_side(mpc_stage *stage, real_t *work_before)
 {
     const stage_matrix *const a = &stage->a;
     const real_t rho = mpc_par.rho;
@@ -309,10 +314,8 @@ static void right_hand_side(mpc_stage *stage, int32_t has_before)
     work[VAR_P_ENG] += p_eng;
     work[VAR_SOC] += (a->soc[0] * soc) + ((rho * z[ROW_BOX_SOC]) - y[ROW_BOX_SOC]);
     work[VAR_T_CL] += (a->t_cl[0] * t_cl) + (a->t_min[0] * t_min) + (a->t_max[0] * t_max);
-    if (has_before != 0) {
-        BEFORE(stage)->work[VAR_SOC] += a->soc[1] * soc;
-        BEFORE(stage)->work[VAR_T_CL] += a->t_cl[1] * t_cl;
-    }
+    work_before[VAR_SOC] += a->soc[1] * soc;
+    work_before[VAR_T_CL] += a->t_cl[1] * t_cl;
 }
 
 /* work <- D^-1 L^-1 work, rows of this stage; of the stage before, L^-1 work is needed */
@@ -341,13 +344,13 @@ static void substitute_forward(mpc_stage *stage, real_t *soc, real_t *t_cl)
 }
 
 /* work <- L^-T work, once the stage after is done */
-static void substitute_backward(mpc_stage *stage, int32_t has_next)
+static void substitute_backward(mpc_stage *stage, const mpc_stage *after)
 {
     const stage_factor *const f = &stage->factor;
     real_t *const b = &stage->work[COUPLED];
-    if (has_next != 0) {
-        const stage_factor *const g = &NEXT(stage)->factor;
-        const real_t *const next = &NEXT(stage)->work[COUPLED];
+    if (after != NULL) {
+        const stage_factor *const g = &after->factor;
+        const real_t *const next = &after->work[COUPLED];
         b[IN_SOC] -= (g->before_soc[0] * next[IN_INTERNAL]) + (g->before_soc[1] * next[IN_SOC]);
         for (int32_t i = 0; i < COUPLED_COUNT; i++) {
             b[IN_T_CL] -= g->before_t[i] * next[i];
@@ -373,13 +376,13 @@ static inline void project(real_t product, real_t low, real_t high, real_t *z, r
     *z = inside;
 }
 
-/* The same for an equality. */
-static inline void project_onto(real_t product, real_t value, real_t *z, real_t *y)
+/* The same for an equality with 0. */
+static inline void project_onto_zero(real_t product, real_t *z, real_t *y)
 {
     const real_t relaxed =
         (mpc_par.relaxation * product) + ((REAL(1.0) - mpc_par.relaxation) * *z);
-    *y += mpc_par.rho_equality * (relaxed - value);
-    *z = value;
+    *y += mpc_par.rho_equality * relaxed;
+    *z = REAL(0.0);
 }
 
 /* The second and third line of the iteration for one stage. */
@@ -394,7 +397,7 @@ static void update(mpc_stage *stage, const real_t *before)
         stage->x[i] = (mpc_par.relaxation * stage->work[i])
                       + ((REAL(1.0) - mpc_par.relaxation) * stage->x[i]);
     }
-    project_onto(product[ROW_SOC], b->soc, &z[ROW_SOC], &y[ROW_SOC]);
+    project_onto_zero(product[ROW_SOC], &z[ROW_SOC], &y[ROW_SOC]);
     project(product[ROW_T_CL], b->t_cl_low, b->t_cl_high, &z[ROW_T_CL], &y[ROW_T_CL]);
     for (int32_t i = ROW_FUEL; i < ROW_BATTERY; i++) {
         project(product[i], REAL(0.0), UNLIMITED, &z[i], &y[i]);
@@ -413,9 +416,11 @@ static void update(mpc_stage *stage, const real_t *before)
 
 void admm_iterate(mpc_state *state, int32_t count)
 {
+    real_t unused[MPC_VARS] = {REAL(0.0), REAL(0.0), REAL(0.0), REAL(0.0),
+                               REAL(0.0), REAL(0.0), REAL(0.0)};
     for (int32_t n = 0; n < count; n++) {
         for (int32_t k = 0; k < MPC_STAGES; k++) {
-            right_hand_side(&state->stage[k], k);
+            right_hand_side(&state->stage[k], (k > 0) ? state->stage[k - 1].work : unused);
         }
         real_t soc = REAL(0.0);
         real_t t_cl = REAL(0.0);
@@ -423,7 +428,7 @@ void admm_iterate(mpc_state *state, int32_t count)
             substitute_forward(&state->stage[k], &soc, &t_cl);
         }
         for (int32_t k = MPC_STAGES - 1; k >= 0; k--) {
-            substitute_backward(&state->stage[k], (k < (MPC_STAGES - 1)) ? 1 : 0);
+            substitute_backward(&state->stage[k], (k < (MPC_STAGES - 1)) ? &state->stage[k + 1] : NULL);
         }
         for (int32_t k = 0; k < MPC_STAGES; k++) {
             update(&state->stage[k], (k > 0) ? state->stage[k - 1].work : nothing);

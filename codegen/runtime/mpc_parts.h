@@ -23,13 +23,14 @@ real_t pwa_battery(real_t power_w);
 
 /* mpc_qp.c: values of the quadratic program */
 void qp_road(mpc_state *state, const mpc_in *in);
-void qp_linearise_cold(mpc_state *state, real_t t_cl_degc);
-void qp_linearise_about_plan(mpc_state *state, real_t t_cl_degc);
-void qp_update(mpc_state *state, real_t soc, real_t t_cl_degc);
+void qp_move_origin(mpc_state *state, real_t soc, real_t t_cl_degc);
+void qp_linearise_cold(mpc_state *state);
+void qp_linearise_about_plan(mpc_state *state);
+void qp_update(mpc_state *state);
 real_t qp_relaxation_gap(const mpc_stage *stage);
 
 /* mpc_admm.c: the solver */
-void admm_start_cold(mpc_state *state);
+void admm_clear(mpc_state *state);
 void admm_to_solver_units(mpc_state *state);
 void admm_to_si_units(mpc_state *state);
 void admm_shift(mpc_state *state, int32_t by);

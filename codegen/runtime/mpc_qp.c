@@ -47,21 +47,34 @@ void qp_road(mpc_state *state, const mpc_in *in)
     }
 }
 
-void qp_linearise_cold(mpc_state *state, real_t t_cl_degc)
+/* Count SOC and coolant temperature from a newly measured state. */
+void qp_move_origin(mpc_state *state, real_t soc, real_t t_cl_degc)
+{
+    const real_t soc_step = state->origin_soc - soc;
+    const real_t t_cl_step = state->origin_t_degc - t_cl_degc;
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
+        state->stage[k].x[VAR_SOC] += soc_step;
+        state->stage[k].x[VAR_T_CL] += t_cl_step;
+    }
+    state->origin_soc = soc;
+    state->origin_t_degc = t_cl_degc;
+}
+
+void qp_linearise_cold(mpc_state *state)
 {
     for (int32_t k = 0; k < MPC_STAGES; k++) {
-        state->stage[k].about_t_degc = t_cl_degc;
+        state->stage[k].about_t_degc = state->origin_t_degc;
         state->stage[k].about_fuel_g_per_s = DEPARTURE_FUEL_G_PER_S;
     }
 }
 
 /* Mean coolant temperature and fuel rate of each stage of the last plan, in SI units. */
-void qp_linearise_about_plan(mpc_state *state, real_t t_cl_degc)
+void qp_linearise_about_plan(mpc_state *state)
 {
-    real_t before = t_cl_degc;
+    real_t before = REAL(0.0);
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         mpc_stage *const stage = &state->stage[k];
-        const real_t mean = REAL(0.5) * (before + stage->x[VAR_T_CL]);
+        const real_t mean = state->origin_t_degc + (REAL(0.5) * (before + stage->x[VAR_T_CL]));
         stage->about_t_degc = real_clip(mean, COLDEST_DEGC, HOTTEST_DEGC);
         stage->about_fuel_g_per_s = real_max(stage->x[VAR_FUEL], REAL(0.0));
         before = stage->x[VAR_T_CL];
@@ -143,9 +156,10 @@ static void fill_engine_rows(mpc_stage *stage)
     stage->b.on_high = factor;
 }
 
-/* SOC_k - SOC_{k-1} + h G / E_bat = 0 and SOC limits that can be met. `reach` is the SOC that
- * charging all the way leads to before this stage; returns that after it. The first stage starts at the measured SOC: there is no SOC before it in x. */
-static real_t fill_soc_rows(mpc_stage *stage, int32_t is_first, real_t soc, real_t reach)
+/* SOC_k - SOC_{k-1} + h G / E_bat = 0 and SOC limits that can be met. `reach` is the SOC, from the
+ * origin, that charging all the way leads to before this stage; returns that after it. The first
+ * stage starts at the origin: there is no SOC before it in x. */
+static real_t fill_soc_rows(mpc_stage *stage, int32_t is_first, real_t origin, real_t reach)
 {
     const real_t rate = stage->duration_s / mpc_par.battery_energy_j;
     const real_t strongest_w =
@@ -155,19 +169,19 @@ static real_t fill_soc_rows(mpc_stage *stage, int32_t is_first, real_t soc, real
     stage->a.soc[1] = (is_first != 0) ? REAL(0.0) : -stage->column[VAR_SOC];
     stage->a.soc[2] = rate * stage->column[VAR_INTERNAL];
     stage->row[ROW_SOC] = normalise(stage->a.soc, 3);
-    stage->b.soc = (is_first != 0) ? (soc * stage->row[ROW_SOC]) : REAL(0.0);
     const real_t factor = REAL(1.0) / stage->column[VAR_SOC];
-    stage->row[ROW_BOX_SOC] = factor;
     const real_t reserve =
         (stage->duration_s > ACCURATE_STAGE_S) ? mpc_par.soc_reserve : REAL(0.0);
-    stage->b.soc_low = real_min(mpc_par.soc_min + reserve, reached - REACH_MARGIN_SOC) * factor;
-    stage->b.soc_high = mpc_par.soc_max * factor;
+    const real_t low = (mpc_par.soc_min + reserve) - origin;
+    stage->row[ROW_BOX_SOC] = factor;
+    stage->b.soc_low = real_min(low, reached - REACH_MARGIN_SOC) * factor;
+    stage->b.soc_high = (mpc_par.soc_max - origin) * factor;
     return reached;
 }
 
 /* Coolant balance about T^, F^, coolant limits, and what fuel and coolant weigh in the cost.
  * Returns the weight of the coolant temperature at each end of the stage. */
-static real_t fill_coolant_rows(mpc_stage *stage, int32_t is_first, real_t t_cl_degc)
+static real_t fill_coolant_rows(mpc_stage *stage, int32_t is_first, real_t origin_degc)
 {
     const real_t share = REAL(1.0) - mpc_par.exhaust_share;
     const real_t heat_j_per_g = share * mpc_par.lhv_j_per_g;
@@ -177,10 +191,9 @@ static real_t fill_coolant_rows(mpc_stage *stage, int32_t is_first, real_t t_cl_
     const real_t rate = stage->duration_s / mpc_par.heat_capacity_j_per_k;
     const real_t ua = mpc_par.ua0_w_per_k + (mpc_par.ua1_w_per_k_per_mps * stage->speed_mps);
     const real_t half = REAL(0.5) * rate * (ua - (heat_j_per_g * growth));
-    const real_t start_degc = (is_first != 0) ? ((REAL(1.0) - half) * t_cl_degc) : REAL(0.0);
-    const real_t high = start_degc
-                        + (rate * ((ua * mpc_par.t_amb_degc) - (heat_j_per_g * growth * about)
-                                   - map_cabin_w(about)));
+    const real_t high =
+        rate * ((ua * (mpc_par.t_amb_degc - origin_degc))
+                - (heat_j_per_g * growth * (about - origin_degc)) - map_cabin_w(about));
     const real_t radiator_w =
         mpc_par.radiator_w_per_k * (mpc_par.t_cl_max_degc - mpc_par.t_amb_degc);
     stage->a.t_cl[0] = (REAL(1.0) + half) * stage->column[VAR_T_CL];
@@ -196,11 +209,11 @@ static real_t fill_coolant_rows(mpc_stage *stage, int32_t is_first, real_t t_cl_
     stage->a.t_min[0] = stage->column[VAR_T_CL];
     stage->a.t_min[1] = stage->column[VAR_SLACK];
     stage->row[ROW_T_MIN] = normalise(stage->a.t_min, 2);
-    stage->b.t_min_low = mpc_par.t_min_degc * stage->row[ROW_T_MIN];
+    stage->b.t_min_low = (mpc_par.t_min_degc - origin_degc) * stage->row[ROW_T_MIN];
     stage->a.t_max[0] = stage->column[VAR_T_CL];
     stage->a.t_max[1] = -stage->column[VAR_SLACK];
     stage->row[ROW_T_MAX] = normalise(stage->a.t_max, 2);
-    stage->b.t_max_high = mpc_par.t_max_degc * stage->row[ROW_T_MAX];
+    stage->b.t_max_high = (mpc_par.t_max_degc - origin_degc) * stage->row[ROW_T_MAX];
     stage->row[ROW_SLACK] = REAL(1.0) / stage->column[VAR_SLACK];
 
     stage->q[VAR_FUEL] = stage->duration_s * alpha;
@@ -209,12 +222,12 @@ static real_t fill_coolant_rows(mpc_stage *stage, int32_t is_first, real_t t_cl_
 }
 
 /* The last stage ends in the SOC band, or pays for its distance from the initial SOC. */
-static void close_trip(mpc_stage *last, real_t reached)
+static void close_trip(mpc_stage *last, real_t origin, real_t reached)
 {
     if (!(mpc_par.soc_penalty_g > REAL(0.0))) {
-        last->b.soc_low = real_min(mpc_par.terminal_soc_low, reached - REACH_MARGIN_SOC)
-                          * last->row[ROW_BOX_SOC];
-        last->b.soc_high = mpc_par.terminal_soc_high * last->row[ROW_BOX_SOC];
+        const real_t low = mpc_par.terminal_soc_low - origin;
+        last->b.soc_low = real_min(low, reached - REACH_MARGIN_SOC) * last->row[ROW_BOX_SOC];
+        last->b.soc_high = (mpc_par.terminal_soc_high - origin) * last->row[ROW_BOX_SOC];
     }
 }
 
@@ -236,12 +249,12 @@ static void scale_cost(mpc_state *state)
     const real_t curvature =
         REAL(2.0) * mpc_par.soc_penalty_g * state->cost * last->column[VAR_SOC];
     last->hessian[VAR_SOC] = curvature * last->column[VAR_SOC];
-    last->q[VAR_SOC] -= curvature * mpc_par.soc_init;
+    last->q[VAR_SOC] += curvature * (state->origin_soc - mpc_par.soc_init);
 }
 
-void qp_update(mpc_state *state, real_t soc, real_t t_cl_degc)
+void qp_update(mpc_state *state)
 {
-    real_t reach = soc;
+    real_t reach = REAL(0.0);
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         mpc_stage *const stage = &state->stage[k];
         for (int32_t i = 0; i < MPC_VARS; i++) {
@@ -255,14 +268,14 @@ void qp_update(mpc_state *state, real_t soc, real_t t_cl_degc)
         fill_fuel_rows(stage);
         fill_battery_rows(stage);
         fill_engine_rows(stage);
-        reach = fill_soc_rows(stage, is_first, soc, reach);
-        const real_t t_cl_weight = fill_coolant_rows(stage, is_first, t_cl_degc);
+        reach = fill_soc_rows(stage, is_first, state->origin_soc, reach);
+        const real_t t_cl_weight = fill_coolant_rows(stage, is_first, state->origin_t_degc);
         stage->q[VAR_T_CL] += t_cl_weight;
         if (k > 0) {
             state->stage[k - 1].q[VAR_T_CL] += t_cl_weight;
         }
     }
-    close_trip(&state->stage[MPC_STAGES - 1], reach);
+    close_trip(&state->stage[MPC_STAGES - 1], state->origin_soc, reach);
     scale_cost(state);
 }
 

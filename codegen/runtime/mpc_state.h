@@ -49,14 +49,16 @@ typedef struct {
     real_t t_max[2];                        /* t_cl, slack */
 } stage_matrix;
 
-/* Bounds of the rows that do not end at 0: all others are fuel >= 0, p_max <= 0, slack >= 0. */
+/* Bounds other than 0, which the others have: soc = 0, fuel >= 0, p_max <= 0, slack >= 0. */
 typedef struct {
-    real_t soc; /* equality */
-    real_t t_cl_low, t_cl_high;
+    real_t t_cl_low;
+    real_t t_cl_high;
     real_t battery_low[MPC_BATTERY_PIECES];
     real_t p_min_low;
-    real_t soc_low, soc_high;
-    real_t on_low, on_high;
+    real_t soc_low;
+    real_t soc_high;
+    real_t on_low;
+    real_t on_high;
     real_t t_min_low;
     real_t t_max_high;
 } stage_bounds;
@@ -85,7 +87,8 @@ typedef struct {
     real_t column[MPC_VARS]; /* SI value = column * solver value */
     real_t row[MPC_ROWS];
     stage_factor factor;
-    real_t x[MPC_VARS]; /* in SI units between steps, in solver units while solving */
+    real_t x[MPC_VARS]; /* in SI units between steps, in solver units while solving; SOC and
+                           coolant temperature from the origin */
     real_t z[MPC_ROWS];
     real_t y[MPC_ROWS];
     real_t work[MPC_VARS];
@@ -108,6 +111,10 @@ typedef struct {
 
 typedef struct {
     mpc_stage stage[MPC_STAGES];
+    /* Where SOC and coolant temperature are counted from: the state at the start of the horizon.
+     * Small numbers keep the digits of single precision for what the plan changes. */
+    real_t origin_soc;
+    real_t origin_t_degc;
     real_t cost;                     /* of the solver, in units per g */
     real_t old_sigma[MPC_SHORT];     /* last usable plan */
     real_t old_p_eng_w[MPC_SHORT];

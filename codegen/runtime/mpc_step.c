@@ -22,20 +22,18 @@ void mpc_init(mpc_state *state)
 /* Make the values of this second and start at the last solution, or at nothing. */
 static void prepare(mpc_state *state, const mpc_in *in)
 {
-    const int32_t is_cold = (state->phase == PHASE_COLD) ? 1 : 0;
-    if (is_cold != 0) {
-        qp_linearise_cold(state, state->good.t_cl_degc);
+    if (state->phase == PHASE_COLD) {
+        admm_clear(state);
+        qp_move_origin(state, state->good.soc, state->good.t_cl_degc);
+        qp_linearise_cold(state);
     } else {
-        qp_linearise_about_plan(state, state->good.t_cl_degc);
+        qp_move_origin(state, state->good.soc, state->good.t_cl_degc);
+        qp_linearise_about_plan(state);
     }
     qp_road(state, in);
-    qp_update(state, state->good.soc, state->good.t_cl_degc);
+    qp_update(state);
     admm_factorise(state);
-    if (is_cold != 0) {
-        admm_start_cold(state);
-    } else {
-        admm_to_solver_units(state);
-    }
+    admm_to_solver_units(state);
 }
 
 /* Bring the iterate back into SI units; returns whether it is usable. If not, the solver is cold:
@@ -175,6 +173,8 @@ void mpc_plan(const mpc_state *state, real_t *x, real_t *duals)
             const real_t unit = (in_si != 0) ? REAL(1.0) : stage->column[order[i]];
             x[(k * MPC_VARS) + i] = stage->x[order[i]] * unit;
         }
+        x[k * MPC_VARS] += state->origin_soc;
+        x[(k * MPC_VARS) + 1] += state->origin_t_degc;
         for (int32_t i = 0; i < MPC_ROWS; i++) {
             const real_t unit = (in_si != 0) ? REAL(1.0) : (stage->row[i] / state->cost);
             duals[(k * MPC_ROWS) + i] = stage->y[i] * unit;
