@@ -13,8 +13,10 @@ from qpmpc.cli.codegen import codegen
 from qpmpc.cli.compare import compare
 from qpmpc.cli.cycles import cycles
 from qpmpc.cli.pil import pil
+from qpmpc.cli.reproduce import reproduce
 from qpmpc.cli.simulate import simulate
 from qpmpc.cli.vehicles import vehicles
+from qpmpc.cli.verify import verify
 from qpmpc.errors import InputError, QpmpcError
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -34,6 +36,8 @@ app.command()(compare)
 app.command()(benchmark)
 app.command()(codegen)
 app.command()(pil)
+app.command()(reproduce)
+app.command()(verify)
 app.command()(cycles)
 app.command()(vehicles)
 

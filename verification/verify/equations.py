@@ -11,7 +11,7 @@ from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
 
-SPEED_POINTS = 1681
+SPEED_STEP_RPM = 5.0  # the plant takes the best speed of a grid this fine
 GRAVITY_MPS2 = 9.81
 
 
@@ -55,7 +55,7 @@ class Equations:
         power = np.atleast_1d(np.asarray(power_w, dtype=float))
         low = max(engine.friction_speed_rpm[0], engine.torque_speed_rpm[0])
         high = min(engine.friction_speed_rpm[-1], engine.torque_speed_rpm[-1])
-        rpm = np.linspace(low, high, SPEED_POINTS)
+        rpm = np.linspace(low, high, round((high - low) / SPEED_STEP_RPM) + 1)
         torque = np.interp(rpm, engine.torque_speed_rpm, engine.torque_max_nm)
         most_w = torque * rpm * np.pi / 30.0
         # litres a second, times the friction work of a litre and revolution

@@ -1,0 +1,55 @@
+"""One check: what is claimed, what was measured, and whether the claim holds."""
+
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Check:
+    """Result of one check; it passes if the measured value is finite and within the tolerance.
+
+    Attributes
+    ----------
+    name : short, unique
+    claim : what must hold, in one sentence
+    tolerance : largest allowed value, or least if `at_least`
+    measured : what was found
+    unit : of both; empty for plain numbers
+    detail : anything a reader needs in order to judge the figure
+    """
+
+    name: str
+    claim: str
+    tolerance: float
+    measured: float
+    unit: str = ""
+    detail: str = ""
+    at_least: bool = field(default=False)
+
+    @property
+    def passed(self) -> bool:
+        """Whether the claim holds."""
+        if not isfinite(self.measured):
+            return False
+        if self.at_least:
+            return self.measured >= self.tolerance
+        return self.measured <= self.tolerance
+
+    @property
+    def verdict(self) -> str:
+        """`pass` or `FAIL`."""
+        return "pass" if self.passed else "FAIL"
+
+    def summary(self) -> dict[str, Any]:
+        """Return plain data, ready for JSON; a value that is not finite is null."""
+        return {
+            "name": self.name,
+            "claim": self.claim,
+            "tolerance": self.tolerance,
+            "relation": ">=" if self.at_least else "<=",
+            "measured": self.measured if isfinite(self.measured) else None,
+            "unit": self.unit,
+            "verdict": self.verdict,
+            "detail": self.detail,
+        }

@@ -1,0 +1,85 @@
+"""All checks, in the order of the report."""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+from qpmpc.verification.verify import (
+    balance_checks,
+    bound_checks,
+    epa_checks,
+    physics_checks,
+    pwa_checks,
+    qp_checks,
+    relaxation_checks,
+)
+from qpmpc.verification.verify.check import Check
+from qpmpc.verification.verify.context import Context
+
+Checks = Callable[[Context], Iterable[Check]]
+
+
+@dataclass(frozen=True)
+class Group:
+    """Checks under one heading.
+
+    Attributes
+    ----------
+    title : heading
+    checks : functions, each of which yields checks
+    quick : whether they are part of the quick run, on fewer cycles and samples
+    """
+
+    title: str
+    checks: tuple[Checks, ...]
+    quick: bool = True
+
+
+GROUPS = (
+    Group("Piecewise-affine curves", (pwa_checks.bounds_hold, pwa_checks.trip_error_small)),
+    Group(
+        "Relaxation and expansion",
+        (relaxation_checks.relaxation_tight, relaxation_checks.expansion_small),
+    ),
+    Group(
+        "The QP against the equations",
+        (
+            qp_checks.stages_agree,
+            qp_checks.same_optimum,
+            qp_checks.warm_start_shifted,
+            qp_checks.scaling_is_neutral,
+        ),
+    ),
+    Group("QP backends", (qp_checks.kkt_and_backends,)),
+    Group("Balances and limits", (balance_checks.books_balance, balance_checks.limits_kept)),
+    Group(
+        "Physics",
+        (
+            physics_checks.constant_demand,
+            physics_checks.engine_covers_demand,
+            physics_checks.uncoupled,
+            physics_checks.monotone,
+            physics_checks.dimensions,
+        ),
+    ),
+    Group("EPA's dynamometer", (epa_checks.epa_figures,)),
+    Group("Lower bound on fuel", (bound_checks.bound_below_everything,)),
+)
+
+
+def selected(quick: bool) -> list[Group]:
+    """Return the groups of a run."""
+    return [group for group in GROUPS if group.quick or not quick]
+
+
+def run_checks(group: Group, context: Context) -> Iterator[Check]:
+    """Run a group's checks one after the other.
+
+    A function that raises counts as a failed check, so that the others still run.
+    """
+    for function in group.checks:
+        try:
+            yield from function(context)
+        except Exception as error:
+            reason = " ".join(f"{type(error).__name__}: {error}".split())
+            name = f"{function.__name__} could not be completed"
+            yield Check(name, "The check runs to its end.", 0.0, float("nan"), "", reason)
