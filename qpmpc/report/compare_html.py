@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any
 
+import numpy as np
 from jinja2 import Environment, StrictUndefined
 
 from qpmpc.comparison import OPTIMUM, REFERENCE
@@ -44,6 +45,11 @@ def compare_html(
         marks=notes(rows),
         remarks=_remarks(rows, settings),
         relaxed=[row for row in rows if row["sigma_integral_share"] is not None],
+        fractional=[
+            _fractional_demand(run)
+            for run, row in zip(runs, rows, strict=True)
+            if row["sigma_integral_share"] is not None
+        ],
         integral_percent=100.0 * INTEGRAL,
         pictures={cycle: b64encode(data).decode() for cycle, data in pictures.items()},
         parameters=[
@@ -54,6 +60,16 @@ def compare_html(
         settings=json.dumps(settings.model_dump(include=names), indent=2),
         provenance=provenance(),
     )
+
+
+def _fractional_demand(run: Run) -> str:
+    """Quartiles of the demand in the steps whose on-share was fractional, kW."""
+    sigma, demand = run.trajectory.sigma, run.trajectory.demand_w
+    there = demand[(sigma > INTEGRAL) & (sigma < 1.0 - INTEGRAL)] / 1e3
+    if len(there) == 0:
+        return "-"
+    low, high = np.percentile(there, [25, 75])
+    return f"{low:.1f} to {high:.1f}"
 
 
 def _text(value: Any) -> str:
