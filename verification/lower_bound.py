@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from qpmpc.cycles import Cycle
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.verification.dynamic_programming.compiled import compiled
-from qpmpc.verification.verify.equations import Equations
+from qpmpc.verification.equations import Equations
 
 Floats = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ import numpy as np
 from qpmpc.cycles import Cycle
 from qpmpc.results import Run
 from qpmpc.simulate import simulate
+from qpmpc.verification.equations import Equations, Floats
 from qpmpc.verification.verify.check import Check
 from qpmpc.verification.verify.context import Context
-from qpmpc.verification.verify.equations import Equations, Floats
 
 EXACT = 1e-9
 TABLE_STEP_W = 50.0

@@ -12,9 +12,9 @@ from qpmpc.qp import Linearisation, QpSettings, ScalingSettings, StageQp
 from qpmpc.simulate import simulate
 from qpmpc.solvers.registry import make_solver
 from qpmpc.vehicle import Vehicle
+from qpmpc.verification.equations import Equations
 from qpmpc.verification.verify.check import Check
 from qpmpc.verification.verify.context import Context
-from qpmpc.verification.verify.equations import Equations
 
 CYCLE = "nycc"
 SAME, TABLES = 1e-9, 1e-3

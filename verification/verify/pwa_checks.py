@@ -6,9 +6,9 @@ import numpy as np
 
 from qpmpc.pwa import PwaFit, PwaModel
 from qpmpc.vehicle import Vehicle
+from qpmpc.verification.equations import Equations, Floats
 from qpmpc.verification.verify.check import Check
 from qpmpc.verification.verify.context import Context, Loop
-from qpmpc.verification.verify.equations import Equations, Floats
 
 DENSE = 20_000
 COARSE_FUEL_G_PER_S = 2e-6  # the fuel table is interpolated between 50 W and 5 rpm

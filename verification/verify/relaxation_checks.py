@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from qpmpc.verification.equations import Equations
 from qpmpc.verification.verify.check import Check
 from qpmpc.verification.verify.context import Context, Loop
-from qpmpc.verification.verify.equations import Equations
 from qpmpc.verification.verify.stage_program import FUEL, T_CL, expansion
 
 INTEGRAL = 0.02

@@ -14,7 +14,7 @@ from qpmpc.controllers.mh_qp import MhQpSettings
 from qpmpc.cycles import Cycle
 from qpmpc.pwa.fit import PwaFit
 from qpmpc.vehicle.parameters import Vehicle
-from qpmpc.verification.verify.equations import Equations
+from qpmpc.verification.equations import Equations
 
 Floats = NDArray[np.float64]
 

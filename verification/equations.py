@@ -76,13 +76,17 @@ class Equations:
     def voltage_v(self, soc: ArrayLike) -> Floats:
         """U_oc."""
         battery = self.vehicle.battery
-        return np.interp(soc, battery.soc_grid, battery.open_circuit_v)
+        return np.interp(np.asarray(soc, dtype=float), battery.soc_grid, battery.open_circuit_v)
 
     def resistance_ohm(self, soc: ArrayLike, discharging: ArrayLike) -> Floats:
         """R by direction."""
         battery = self.vehicle.battery
-        give = np.interp(soc, battery.soc_grid, battery.resistance_discharge_ohm)
-        take = np.interp(soc, battery.soc_grid, battery.resistance_charge_ohm)
+        give = np.interp(
+            np.asarray(soc, dtype=float), battery.soc_grid, battery.resistance_discharge_ohm
+        )
+        take = np.interp(
+            np.asarray(soc, dtype=float), battery.soc_grid, battery.resistance_charge_ohm
+        )
         return np.where(discharging, give, take)
 
     def terminal_w(self, soc: ArrayLike, current_a: ArrayLike) -> Floats:
@@ -108,7 +112,9 @@ class Equations:
         """Heat to the cabin."""
         th = self.vehicle.thermal
         return np.interp(
-            t_cl_degc, [th.cabin_heat_from_degc, th.cabin_heat_full_degc], [0.0, th.cabin_heat_w]
+            np.asarray(t_cl_degc, dtype=float),
+            [th.cabin_heat_from_degc, th.cabin_heat_full_degc],
+            [0.0, th.cabin_heat_w],
         )
 
     def radiator_w(self, t_cl_degc: ArrayLike) -> Floats:
