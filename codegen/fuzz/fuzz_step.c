@@ -1,0 +1,128 @@
+/* Any bytes in -> a finite, in-range command and a declared status.
+ *
+ * The bytes are read as a sequence of calls: one byte chooses mpc_init, mpc_depart or mpc_step, the
+ * following ones are copied over the inputs or set one number of them, which otherwise stay as they
+ * are: inputs near sensible ones are met as well as nonsense. Built with libFuzzer, or with
+ * -DFUZZ_MAIN as a program that feeds itself: fuzz_step SEED RUNS.
+ */
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "mpc.h"
+#include "mpc_model.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+static void check(const mpc_in *in, const mpc_out *out, int32_t flags)
+{
+    const int32_t all = MPC_BAD_MEASUREMENT | MPC_BAD_PREVIEW | MPC_SOLVER_FAILED | MPC_WARMING_UP;
+    int fine = 1;
+    (void)in;
+    fine &= (out->engine_on == 0) || (out->engine_on == 1);
+    fine &= (out->p_eng_w >= (real_t)0) && (out->p_eng_w <= mpc_par.engine_max_w);
+    fine &= (out->engine_on == 1) || !(out->p_eng_w > (real_t)0);
+    fine &= (out->engine_on == 0) || (out->p_eng_w >= mpc_par.engine_min_w);
+    fine &= (out->rung >= MPC_OPTIMISED) && (out->rung <= MPC_RULES);
+    fine &= (out->flags == flags) && ((flags & ~all) == 0);
+    fine &= (out->rung != MPC_OPTIMISED) || (flags == 0);
+    fine &= (out->sigma * (real_t)0 == (real_t)0);          /* neither infinite nor NaN */
+    fine &= (out->relaxation_gap * (real_t)0 == (real_t)0);
+    if (!fine) {
+        abort();
+    }
+}
+
+static void sensible(mpc_in *in)
+{
+    memset(in, 0, sizeof(*in));
+    in->soc = (real_t)0.6;
+    in->t_cl_degc = (real_t)50;
+    in->demand_w = (real_t)5000;
+    in->speed_mps = (real_t)10;
+    in->short_count = MPC_SHORT;
+    for (int k = 0; k < MPC_SHORT; k++) {
+        in->short_demand_w[k] = (real_t)5000;
+        in->short_speed_mps[k] = (real_t)10;
+    }
+    for (int k = 0; k < MPC_LONG; k++) {
+        in->long_duration_s[k] = (real_t)30;
+        in->long_net_w[k] = (real_t)4000;
+        in->long_speed_mps[k] = (real_t)10;
+        in->long_internal_off_w[k] = (real_t)4100;
+    }
+}
+
+/* One number of the inputs: mostly allowed values, at the edges too. */
+static void set_real(mpc_in *in, size_t at, uint8_t choice)
+{
+    static const real_t values[] = {
+        (real_t)0,     (real_t)1,     (real_t)-1,   (real_t)0.4,   (real_t)0.6,    (real_t)0.8,
+        (real_t)1e-30, (real_t)1e-3,  (real_t)5,    (real_t)30,    (real_t)90,     (real_t)120,
+        (real_t)150,   (real_t)-60,   (real_t)1e3,  (real_t)-3e4,  (real_t)2.7e4,  (real_t)7e4,
+        (real_t)1e5,   (real_t)-1e5,  (real_t)1e6,  (real_t)-1e6,  (real_t)1e9,    (real_t)1e38};
+    const size_t offset = at - (at % sizeof(real_t));
+    const real_t value = values[choice % (sizeof(values) / sizeof(values[0]))];
+    if (offset < offsetof(mpc_in, short_count)) {
+        memcpy((uint8_t *)in + offset, &value, sizeof(value));
+    }
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static mpc_state state;
+    mpc_in in;
+    mpc_out out;
+    mpc_init(&state);
+    sensible(&in);
+    while (size > 3) {
+        const uint8_t call = data[0];
+        const size_t at = ((size_t)data[1] * 256u + data[2]) % sizeof(in);
+        size_t count = data[3] % 64u;
+        data += 4;
+        size -= 4;
+        count = (count < size) ? count : size;
+        count = (count < sizeof(in) - at) ? count : (sizeof(in) - at);
+        if ((call & 1u) == 0u) {
+            memcpy((uint8_t *)&in + at, data, count);
+        } else {
+            set_real(&in, at, (count > 0) ? data[0] : 0u);
+        }
+        data += count;
+        size -= count;
+        if (call < 8) {
+            mpc_init(&state);
+            sensible(&in);
+        } else if (call < 24) {
+            (void)mpc_depart(&state, &in);
+        } else {
+            memset(&out, 0xff, sizeof(out));
+            check(&in, &out, mpc_step(&state, &in, &out));
+        }
+    }
+    return 0;
+}
+
+#ifdef FUZZ_MAIN
+#include <stdio.h>
+
+int main(int argc, char **argv)
+{
+    if (argc != 3) {
+        return 2;
+    }
+    uint64_t random = strtoull(argv[1], NULL, 10) * 2u + 1u;
+    const long runs = strtol(argv[2], NULL, 10);
+    static uint8_t bytes[2048];
+    for (long run = 0; run < runs; run++) {
+        for (size_t i = 0; i < sizeof(bytes); i++) {
+            random = random * 6364136223846793005u + 1442695040888963407u;
+            bytes[i] = (uint8_t)(random >> 56);
+        }
+        (void)LLVMFuzzerTestOneInput(bytes, sizeof(bytes));
+    }
+    printf("%ld runs\n", runs);
+    return 0;
+}
+#endif

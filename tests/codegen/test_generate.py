@@ -1,0 +1,88 @@
+"""The generator: same input, same bytes; every number from the settings; refusals in one line."""
+
+import hashlib
+from pathlib import Path
+
+import pytest
+
+from qpmpc.codegen import Values, generate, values_of
+from qpmpc.codegen.generate import project_files
+from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.errors import InputError
+from qpmpc.vehicle import load_vehicle
+
+
+def values(**overrides: object) -> Values:
+    chosen = {key.replace("__", "."): value for key, value in overrides.items()}
+    settings = ControllerSettings().with_settings(chosen)
+    return values_of(load_vehicle(), settings.mh_qp, settings.rule_based)
+
+
+def digest(folder: Path) -> dict[str, str]:
+    return {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in folder.iterdir()}
+
+
+@pytest.mark.parametrize("target", ["host", "cortex-m7"])
+@pytest.mark.parametrize("precision", ["f32", "f64"])
+def test_same_input_gives_the_same_bytes(tmp_path, target, precision) -> None:
+    generate(values(), tmp_path / "a", target, precision)
+    generate(values(), tmp_path / "b", target, precision)
+    assert digest(tmp_path / "a") == digest(tmp_path / "b")
+    names = {p.name for p in (tmp_path / "a").iterdir()}
+    assert {"README.md", "NOTICE", "Makefile", "mpc.h", "mpc_data.c"} <= names
+
+
+def test_settings_reach_the_code() -> None:
+    files = project_files(
+        values(
+            mh_qp__osqp__iterations=33,
+            mh_qp__osqp__rho=0.25,
+            mh_qp__horizon__blocks=4,
+            mh_qp__qp__slack_g_per_k=7.5,
+            rule_based__min_on_s=9,
+        ),
+        "host",
+        "f64",
+    )
+    config, data = files["mpc_config.h"], files["mpc_data.c"]
+    assert "#define MPC_ITERATIONS 33 " in config
+    assert "#define MPC_BLOCKS 4\n" in config
+    assert ".rho = 0.25," in data
+    assert ".rho_equality = 250.0," in data
+    assert ".slack_g_per_k = 7.5," in data
+    assert ".rule_min_on_s = 9," in data
+
+
+def test_no_path_or_date_of_this_machine_in_the_code() -> None:
+    text = "".join(project_files(values(), "cortex-m7", "f32").values())
+    assert str(Path.home()) not in text
+    assert "__DATE__" not in text
+
+
+def test_single_precision_code_has_no_double_constant() -> None:
+    data = project_files(values(), "host", "f32")["mpc_data.c"]
+    numbers = [line.split("=")[1].strip(" ,;") for line in data.splitlines() if " = " in line]
+    numbers = [n for n in numbers if n[0] in "-0123456789" and n != str(values().min_on_s)]
+    assert len(numbers) > 40
+    assert all(n.endswith("f") for n in numbers)
+
+
+@pytest.mark.parametrize(
+    ("target", "precision", "message"),
+    [("z80", "f32", "unknown target 'z80'"), ("host", "f16", "unknown precision 'f16'")],
+)
+def test_unknown_names_are_refused(tmp_path, target, precision, message) -> None:
+    with pytest.raises(InputError, match=message):
+        generate(values(), tmp_path / "out", target, precision)
+    assert not (tmp_path / "out").exists()
+
+
+def test_open_number_of_blocks_is_refused() -> None:
+    with pytest.raises(InputError, match=r"horizon\.blocks"):
+        values(mh_qp__horizon__blocks=0)
+
+
+def test_terminal_band_without_width_is_refused() -> None:
+    # OSQP would treat such a row as an equality, with another step size
+    with pytest.raises(InputError, match="no band"):
+        values(mh_qp__qp__terminal_low=1.0, mh_qp__qp__terminal_high=1.0)
