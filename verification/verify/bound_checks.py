@@ -18,11 +18,10 @@ ROUNDING_G = 1e-6
 
 def bound_below_everything(context: Context) -> Iterator[Check]:
     """Bound <= DP <= every controller, with the width of the bracket."""
-    quick = ControllerSettings(dp=DpSettings.quick())
     for name in context.cycles:
         cycle = load_cycle(name)
         bound = lower_bound(cycle, context.vehicle)
-        optimum = run(cycle, "dp", context.vehicle, quick if context.quick else context.settings)
+        optimum = optimum_of(context, name)
         runs = [optimum, context.loop(name).run]
         if not context.quick:
             runs += [run(cycle, c, context.vehicle) for c in CONTROLLERS if c != "mh-qp"]
@@ -38,6 +37,12 @@ def bound_below_everything(context: Context) -> Iterator[Check]:
             f"{' on its quick grid' if context.quick else ''}); of the width, about "
             f"{bound.numerical_g:.3f} g is the bound's own interpolation",
         )
+
+
+def optimum_of(context: Context, cycle: str) -> Run:
+    """Dynamic programming on a cycle; in a quick run on its coarser grid."""
+    settings = ControllerSettings(dp=DpSettings.quick()) if context.quick else context.settings
+    return run(load_cycle(cycle), "dp", context.vehicle, settings)
 
 
 def _below(bound: LowerBound, finished: Run) -> Check:

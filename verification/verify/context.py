@@ -7,7 +7,6 @@ import numpy as np
 
 from qpmpc.controllers.factory import ControllerSettings
 from qpmpc.controllers.mh_qp import MhQp, MhQpSettings
-from qpmpc.controllers.planner import DEPARTURE_LINEARISATIONS
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.preview.forecast import Trace
 from qpmpc.qp.stage_qp import QpData
@@ -112,7 +111,7 @@ class Context:
         keeper = _Keeper(Osqp(mh_qp.osqp))
         controller = MhQp("mh-qp", plant, truth, truth, mh_qp, rules, solver=keeper)
         run = simulate(cycle, controller, self.vehicle)
-        first = DEPARTURE_LINEARISATIONS
+        first = len(keeper.qps) - cycle.steps  # before them, those of the preparation
         nothing = np.empty(0)
         starts = [
             (nothing if qp.z is None else qp.z, nothing if qp.y is None else qp.y)

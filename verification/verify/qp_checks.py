@@ -1,6 +1,7 @@
 """The QP: the same stages, the same problem and the same optimum as written down a second time."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -208,6 +209,33 @@ def _backend(name: str, loop: Loop, qp: StageQp, best: dict[int, QpSolution]) ->
     if not solved:
         off = float("nan")
     return Check(title, claim, loose.get(name, AGREE), off, "relative", detail)
+
+
+def infeasible_noticed(context: Context) -> Iterator[Check]:
+    """A QP whose third stage must end at ten times the highest SOC."""
+    loop = context.loop("nycc")
+    qp = loop.controller.planner.qp
+    data = loop.data[10]
+    row = 2 * qp.rows.count + qp.rows.box_soc
+    lower, upper = data.lower.copy(), data.upper.copy()
+    lower[row] = upper[row] = 10.0 * upper[row]
+    impossible = replace(data, lower=lower, upper=upper)
+    claimed = []
+    names = [n for n in (QUICK_BACKENDS if context.quick else solver_names()) if n != "osqp"]
+    for name in names:
+        solver = make_solver(name, 1e-8)
+        solver.setup(qp.structure, data)
+        if solver.solve(impossible, None, None, cold=True).usable:
+            claimed.append(name)
+    yield Check(
+        "Infeasible QP",
+        "No backend claims to have solved a QP without a solution.",
+        0.0,
+        float(len(claimed)),
+        "backends",
+        f"asked: {', '.join(names)}; claimed: {', '.join(claimed) or 'none'}. OSQP with its fixed "
+        "iterations cannot tell: reachable limits and the safety layer stand in for it",
+    )
 
 
 def scaling_is_neutral(context: Context) -> Iterator[Check]:

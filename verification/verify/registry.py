@@ -11,6 +11,7 @@ from qpmpc.verification.verify import (
     pwa_checks,
     qp_checks,
     relaxation_checks,
+    relaxed_trip_checks,
 )
 from qpmpc.verification.verify.check import Check
 from qpmpc.verification.verify.context import Context
@@ -49,7 +50,7 @@ GROUPS = (
             qp_checks.scaling_is_neutral,
         ),
     ),
-    Group("QP backends", (qp_checks.kkt_and_backends,)),
+    Group("QP backends", (qp_checks.kkt_and_backends, qp_checks.infeasible_noticed)),
     Group("Balances and limits", (balance_checks.books_balance, balance_checks.limits_kept)),
     Group(
         "Physics",
@@ -62,7 +63,10 @@ GROUPS = (
         ),
     ),
     Group("EPA's dynamometer", (epa_checks.epa_figures,)),
-    Group("Lower bound on fuel", (bound_checks.bound_below_everything,)),
+    Group(
+        "Least fuel of a trip",
+        (bound_checks.bound_below_everything, relaxed_trip_checks.relaxed_trip_close),
+    ),
 )
 
 
