@@ -94,6 +94,16 @@ def _thermal(study: Study) -> list[str]:
                 f"{100 * ours.off_share_last:.0f} % ({OURS}) and "
                 f"{100 * rules.off_share_last:.0f} % (rules) of the time."
             )
+        solution = study.optima[cycle.name]
+        kelvin_mg = 1e3 * float(solution.t_cl_costate_g_per_k[0])
+        stored_g = kelvin_mg * 1e-3 * float(solution.t_cl_degc.max() - solution.t_cl_degc.min())
+        text.append(
+            f"{cycle.name}: at departure a kelvin of coolant is worth {kelvin_mg:.0f} mg of fuel "
+            f"to DP and the whole swing of its coolant some {stored_g:.2f} g, "
+            f"{100 * stored_g / solution.fuel_total_g:.1f} % of the trip's fuel; a hundredth of "
+            f"SOC {10 * float(solution.soc_costate_g[0]):.0f} mg. On this plant heat follows "
+            "from when the engine runs for power more than the other way round."
+        )
     return text
 
 
@@ -123,11 +133,8 @@ def _causes(study: Study) -> list[str]:
 def _rules_range(study: Study, cycle: str) -> list[str]:
     table = experiments_table(study).records()
     column = "saving of DP over these rules, %"
-    saved = [
-        float(row[column])
-        for row in table
-        if row["cycle"] == cycle and isinstance(row[column], float)
-    ]
+    cells = [row[column] for row in table if row["cycle"] == cycle]
+    saved = [cell for cell in cells if isinstance(cell, float)]
     saved.append(study.rows[cycle, OPTIMUM]["saving_vs_rule_percent"])
     return [
         f"{cycle}: other plausible thresholds of the rules move DP's saving between "

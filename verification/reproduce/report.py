@@ -41,13 +41,13 @@ def drawers(study: Study) -> list[Callable[[], Picture]]:
     cycles = [cycle.name for cycle in study.extent.cycles]
     return [
         lambda: alpha_picture(study),
-        *(lambda name=name: baseline_picture(study, name) for name in cycles),  # type: ignore[misc]
+        *(lambda name=name: baseline_picture(study, name) for name in cycles),
         lambda: horizon_picture(study),
         lambda: horizon_fuel_picture(study),
         lambda: concept_picture(study),
         lambda: fuel_picture(study),
-        *(lambda name=name: all_picture(study, name) for name in cycles),  # type: ignore[misc]
-        *(lambda name=name: thermal_picture(study, name) for name in cycles),  # type: ignore[misc]
+        *(lambda name=name: all_picture(study, name) for name in cycles),
+        *(lambda name=name: thermal_picture(study, name) for name in cycles),
         lambda: robustness_picture(study),
         lambda: cycles_picture(study),
     ]

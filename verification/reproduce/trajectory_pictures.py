@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from qpmpc.report.style import BLACK, BLUE, ORANGE, VERMILION
+from qpmpc.report.style import BLACK, BLUE, ORANGE, PURPLE
 from qpmpc.verification.reproduce.drawing import (
     engine_panel,
     finish,
@@ -90,28 +90,26 @@ def thermal_picture(study: Study, cycle: str) -> Picture:
     engine_panel(engine, run, OPTIMUM)
     soc.plot(best.soc, color=BLUE, linewidth=1.2)
     soc.set_ylabel("SOC")
-    coolant.plot(best.t_cl_degc, color=VERMILION, linewidth=1.2)
-    ours = study.runs[cycle, OURS].trajectory.t_cl_degc
-    coolant.plot(ours, label=OURS, **{**style(OURS), "linewidth": 0.7})
+    coolant.plot(study.runs[cycle, OURS].trajectory.t_cl_degc, label=OURS, **style(OURS))
+    coolant.plot(best.t_cl_degc, label=OPTIMUM, **style(OPTIMUM))
     coolant.set_ylabel("coolant\n°C")
-    worth.plot(1e3 * best.t_cl_costate_g_per_k, color=VERMILION, linewidth=1.2)
+    worth.plot(1e3 * best.t_cl_costate_g_per_k, color=PURPLE, linewidth=1.2)
     worth.set_ylabel("a kelvin's\nworth, mg")
     worth.set_ylim(bottom=min(0.0, float(1.1e3 * best.t_cl_costate_g_per_k.min())))
     twin = worth.twinx()
     twin.plot(best.soc_costate_g / 100.0, color=BLUE, linewidth=1.0)
     twin.set_ylabel("SOC: worth of\n0.01, g", fontsize=8.5, color=BLUE)
     twin.tick_params(labelsize=8, colors=BLUE)
-    worth.yaxis.label.set_color(VERMILION)
-    worth.tick_params(axis="y", colors=VERMILION)
+    worth.yaxis.label.set_color(PURPLE)
+    worth.tick_params(axis="y", colors=PURPLE)
     twin.spines[["top", "left"]].set_color("none")
     soc.axhline(study.vehicle.trip.soc_init, color=BLACK, linewidth=0.5)
     return Picture(
         f"thermal_{cycle}",
         f"The coolant as a store: dynamic programming on {cycle}",
         "The costates say what fuel a kelvin of coolant and a hundredth of SOC save later. Heat is "
-        "worth least where the trip no longer needs it: a warm engine at arrival is waste. Thin: "
-        f"coolant of {OURS}.",
-        finish(figure, axes, f"{cycle}: what heat and charge are worth"),
+        "worth least where the trip no longer needs it: a warm engine at arrival is waste.",
+        finish(figure, axes, f"{cycle}: what heat and charge are worth", coolant),
         {
             "time_s": range(len(best.soc)),
             "soc": best.soc.tolist(),
