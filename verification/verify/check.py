@@ -1,6 +1,6 @@
 """One check: what is claimed, what was measured, and whether the claim holds."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
@@ -13,10 +13,12 @@ class Check:
     ----------
     name : short, unique
     claim : what must hold, in one sentence
-    tolerance : largest allowed value, or least if `at_least`
+    tolerance : largest allowed value
     measured : what was found
     unit : of both; empty for plain numbers
     detail : anything a reader needs in order to judge the figure
+    at_least : the tolerance is the least allowed value
+    skipped : it could not be tried on this machine, for the reason that `detail` gives
     """
 
     name: str
@@ -25,11 +27,14 @@ class Check:
     measured: float
     unit: str = ""
     detail: str = ""
-    at_least: bool = field(default=False)
+    at_least: bool = False
+    skipped: bool = False
 
     @property
     def passed(self) -> bool:
-        """Whether the claim holds."""
+        """Whether the claim holds, as far as it was tried."""
+        if self.skipped:
+            return True
         if not isfinite(self.measured):
             return False
         if self.at_least:
@@ -38,7 +43,9 @@ class Check:
 
     @property
     def verdict(self) -> str:
-        """`pass` or `FAIL`."""
+        """`pass`, `FAIL` or `skipped`."""
+        if self.skipped:
+            return "skipped"
         return "pass" if self.passed else "FAIL"
 
     def summary(self) -> dict[str, Any]:

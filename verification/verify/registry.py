@@ -12,6 +12,7 @@ from qpmpc.verification.verify import (
     qp_checks,
     relaxation_checks,
     relaxed_trip_checks,
+    rendering_checks,
 )
 from qpmpc.verification.verify.check import Check
 from qpmpc.verification.verify.context import Context
@@ -51,6 +52,7 @@ GROUPS = (
         ),
     ),
     Group("QP backends", (qp_checks.kkt_and_backends, qp_checks.infeasible_noticed)),
+    Group("Other renderings", (rendering_checks.generated_c,)),
     Group("Balances and limits", (balance_checks.books_balance, balance_checks.limits_kept)),
     Group(
         "Physics",
