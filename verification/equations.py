@@ -76,7 +76,8 @@ class Equations:
     def voltage_v(self, soc: ArrayLike) -> Floats:
         """U_oc."""
         battery = self.vehicle.battery
-        return np.interp(np.asarray(soc, dtype=float), battery.soc_grid, battery.open_circuit_v)
+        found = np.interp(np.asarray(soc, dtype=float), battery.soc_grid, battery.open_circuit_v)
+        return np.asarray(found)
 
     def resistance_ohm(self, soc: ArrayLike, discharging: ArrayLike) -> Floats:
         """R by direction."""
@@ -87,7 +88,7 @@ class Equations:
         take = np.interp(
             np.asarray(soc, dtype=float), battery.soc_grid, battery.resistance_charge_ohm
         )
-        return np.where(discharging, give, take)
+        return np.asarray(np.where(discharging, give, take))
 
     def terminal_w(self, soc: ArrayLike, current_a: ArrayLike) -> Floats:
         """Terminal power of a current, U I - R I^2, discharge positive."""
@@ -111,11 +112,9 @@ class Equations:
     def cabin_w(self, t_cl_degc: ArrayLike) -> Floats:
         """Heat to the cabin."""
         th = self.vehicle.thermal
-        return np.interp(
-            np.asarray(t_cl_degc, dtype=float),
-            [th.cabin_heat_from_degc, th.cabin_heat_full_degc],
-            [0.0, th.cabin_heat_w],
-        )
+        fades = [th.cabin_heat_from_degc, th.cabin_heat_full_degc]
+        t = np.asarray(t_cl_degc, dtype=float)
+        return np.asarray(np.interp(t, fades, [0.0, th.cabin_heat_w]))
 
     def radiator_w(self, t_cl_degc: ArrayLike) -> Floats:
         """Heat to the radiator."""

@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.cycles import Cycle
+from qpmpc.errors import InputError
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.verification.dynamic_programming.compiled import compiled
 from qpmpc.verification.equations import Equations
@@ -92,11 +93,21 @@ def lower_bound(cycle: Cycle, vehicle: Vehicle) -> LowerBound:
     cycle : what is driven
     vehicle : the plant; the run starts at `vehicle.trip` and keeps the limits of SOC, coolant,
         engine and battery
+
+    Raises
+    ------
+    InputError
+        If the trip starts outside the coolant limits, which the bound takes as kept throughout.
     """
+    th, start = vehicle.thermal, vehicle.trip.t_cl_init_degc
+    if not th.t_cl_min_degc <= start <= th.t_cl_max_degc:
+        raise InputError(
+            f"vehicle {vehicle.name}: trip.t_cl_init_degc: the lower bound on fuel needs it within "
+            f"{th.t_cl_min_degc:g} .. {th.t_cl_max_degc:g} (given: {start:g})"
+        )
     tables = _tables(cycle, vehicle)
     lhv = vehicle.engine.lhv_j_per_kg * 1e-3
     low, high = 1.0 / (LAST_EFFICIENCY * lhv), 1.0 / (FIRST_EFFICIENCY * lhv)
-    start = vehicle.trip.t_cl_init_degc
 
     def bound(price: float, strict: float = 1.0) -> float:
         value = _sweep(tables, price, strict)

@@ -1,0 +1,95 @@
+"""The lower bound on fuel: below everything that drives, near the optimum, and not by luck."""
+
+import numpy as np
+import pytest
+
+from qpmpc.controllers.base import Decision
+from qpmpc.controllers.safety import SafetyLayer
+from qpmpc.cycles import Cycle, load_cycle
+from qpmpc.errors import InputError
+from qpmpc.runners import run
+from qpmpc.simulate import simulate
+from qpmpc.vehicle import Command, Plant, load_vehicle
+from qpmpc.verification.lower_bound import lower_bound, stored_energy_j
+from qpmpc.verification.relaxed_trip import relaxed_trip
+
+VEHICLE = load_vehicle()
+STEPS = 150
+
+
+@pytest.fixture(scope="module")
+def trip() -> Cycle:
+    nycc = load_cycle("nycc")
+    part = slice(STEPS + 1)
+    return Cycle("nycc-150", nycc.time_s[part], nycc.speed_mps[part], nycc.grade[part])
+
+
+@pytest.fixture(scope="module")
+def bound(trip):
+    return lower_bound(trip, VEHICLE)
+
+
+class Dice:
+    """Throws engine state and power anew every few seconds; the safety layer keeps the limits."""
+
+    name, solver_name = "dice", ""
+
+    def __init__(self, seed: int) -> None:
+        self._dice = np.random.default_rng(seed)
+        self._safety = SafetyLayer(Plant(VEHICLE))
+        self._wish = Command(False, 0.0)
+
+    def decide(self, seen) -> Decision:
+        if seen.step % 7 == 0:
+            self._wish = Command(self._dice.random() < 0.3, 25e3 * self._dice.random())
+        return Decision(self._safety.admissible(self._wish, seen))
+
+
+def priced_g(finished, bound) -> float:
+    soc = finished.trajectory.soc
+    used = stored_energy_j(VEHICLE, float(soc[0])) - stored_energy_j(VEHICLE, float(soc[-1]))
+    return finished.fuel_g + bound.price_g_per_j * used
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_random_drive_is_below_it(trip, bound, seed):
+    finished = simulate(trip, Dice(seed), VEHICLE)
+    assert not any(finished.summary()["violations"].values())
+    assert priced_g(finished, bound) >= bound.fuel_g
+
+
+@pytest.mark.parametrize("name", ["mh-qp", "rule-based", "ecms"])
+def test_no_controller_is_below_it(trip, bound, name):
+    assert priced_g(run(trip, name, VEHICLE), bound) >= bound.fuel_g
+
+
+def test_it_is_not_empty_words(trip, bound):
+    # On a trip this short one switch of the engine costs more than on a whole cycle.
+    assert bound.fuel_g > 0.95 * priced_g(run(trip, "mh-qp", VEHICLE), bound)
+    assert 0.0 <= bound.numerical_g < 0.01 * bound.fuel_g
+
+
+def test_what_makes_the_trip_harder_raises_it(trip, bound):
+    for harder in ({"thermal.cabin_heat_w": 3000.0}, {"battery.aux_power_w": 800.0}):
+        assert lower_bound(trip, VEHICLE.with_settings(harder)).fuel_g > bound.fuel_g
+
+
+def test_a_start_outside_the_coolant_limits_is_refused(trip):
+    with pytest.raises(InputError, match=r"trip\.t_cl_init_degc"):
+        lower_bound(trip, VEHICLE.with_settings({"trip.t_cl_init_degc": -7.0}))
+
+
+def test_stored_energy_is_the_integral_of_the_voltage():
+    soc = np.linspace(0.5, 0.7, 20001)
+    voltage = Plant(VEHICLE).battery.open_circuit(soc)
+    expected = 3600.0 * VEHICLE.battery.capacity_ah * np.trapezoid(voltage, soc)
+    found = stored_energy_j(VEHICLE, 0.7) - stored_energy_j(VEHICLE, 0.5)
+    assert found == pytest.approx(expected, rel=1e-9)
+    assert stored_energy_j(VEHICLE, VEHICLE.battery.soc_min) == 0.0
+    assert stored_energy_j(VEHICLE, 0.3) < 0.0
+
+
+def test_relaxed_trip_is_below_the_bracket_and_integral(trip, bound):
+    relaxed = relaxed_trip(trip, VEHICLE)
+    assert relaxed.fuel_g == pytest.approx(bound.fuel_g, rel=0.05)
+    assert relaxed.integral_share > 0.98
