@@ -25,7 +25,7 @@ class Table:
 
     def __call__(self, x: ArrayLike) -> NDArray[np.float64]:
         """Interpolate an array of any shape."""
-        return np.interp(np.asarray(x, dtype=float), self.x, self.y)
+        return np.asarray(np.interp(np.asarray(x, dtype=float), self.x, self.y))
 
     def at(self, x: float) -> float:
         """Interpolate one value (the plant's fast path: no array is made)."""
