@@ -7,6 +7,7 @@ from qpmpc.verification.verify import (
     balance_checks,
     bound_checks,
     epa_checks,
+    nlp_checks,
     physics_checks,
     pwa_checks,
     qp_checks,
@@ -53,6 +54,7 @@ GROUPS = (
     ),
     Group("QP backends", (qp_checks.kkt_and_backends, qp_checks.infeasible_noticed)),
     Group("Other renderings", (rendering_checks.generated_c,)),
+    Group("The nonlinear program", (nlp_checks.against_the_nonlinear_program,), quick=False),
     Group("Balances and limits", (balance_checks.books_balance, balance_checks.limits_kept)),
     Group(
         "Physics",
