@@ -157,7 +157,7 @@ def _build(values: Values, precision: Precision, command: str, kept: Path) -> No
     with tempfile.TemporaryDirectory(dir=kept.parent) as scratch:
         folder = Path(scratch)
         generate(values, folder, "host", precision)
-        flags = "-O2 -std=c99 -Wall -Wextra -Wconversion -Werror -ffp-contract=off -fPIC -shared"
+        flags = "-O3 -std=c99 -Wall -Wextra -Wconversion -Werror -ffp-contract=off -fPIC -shared"
         sources = sorted(file.name for file in folder.glob("*.c"))
         result = subprocess.run(
             [command, *flags.split(), "-o", "libmpc.so", *sources, "-lm"],

@@ -12,18 +12,22 @@
 #define REAL_SQRT(x) sqrtf(x)
 #define REAL_POW(x, y) powf((x), (y))
 #define REAL_ABS(x) fabsf(x)
+#define REAL_FMIN(a, b) fminf((a), (b))
+#define REAL_FMAX(a, b) fmaxf((a), (b))
 #else
 #define REAL_SQRT(x) sqrt(x)
 #define REAL_POW(x, y) pow((x), (y))
 #define REAL_ABS(x) fabs(x)
+#define REAL_FMIN(a, b) fmin((a), (b))
+#define REAL_FMAX(a, b) fmax((a), (b))
 #endif
 
 /* Without branches, so that time does not depend on data. Of a NaN and a number as second argument
  * the number wins. MPC_NATIVE_MINMAX, from the build, says that the processor has instructions for
  * fmin and fmax (as the Cortex-M7's FPv5 has); elsewhere they are slow library calls. */
-#if defined(MPC_NATIVE_MINMAX) && MPC_F32
-static inline real_t real_min(real_t a, real_t b) { return fminf(a, b); }
-static inline real_t real_max(real_t a, real_t b) { return fmaxf(a, b); }
+#if defined(MPC_NATIVE_MINMAX)
+static inline real_t real_min(real_t a, real_t b) { return REAL_FMIN(a, b); }
+static inline real_t real_max(real_t a, real_t b) { return REAL_FMAX(a, b); }
 #else
 static inline real_t real_min(real_t a, real_t b) { return (a < b) ? a : b; }
 static inline real_t real_max(real_t a, real_t b) { return (a > b) ? a : b; }
