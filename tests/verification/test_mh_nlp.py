@@ -1,0 +1,256 @@
+"""The nonlinear reference: its maps, its plans against the equations, its closed loop."""
+
+import json
+import sys
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import brentq
+
+from qpmpc.controllers.base import Observation
+from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.cycles import Cycle, load_cycle
+from qpmpc.errors import QpmpcError
+from qpmpc.preview import Trace
+from qpmpc.simulate import simulate
+from qpmpc.vehicle import Plant, Vehicle, load_vehicle
+from qpmpc.verification.equations import Equations
+from qpmpc.verification.mh_nlp import MhNlp, MhNlpSettings, make_mh_nlp
+from qpmpc.verification.nlp_comparison import compare, compare_open_loop
+from qpmpc.verification.nlp_maps import RoundedTable, SmoothMaps
+from qpmpc.verification.nlp_problem import NlpVar
+from qpmpc.verification.nlp_solver import NlpPlan
+
+VEHICLE = load_vehicle()
+EQUATIONS = Equations(VEHICLE)
+MAPS = SmoothMaps(VEHICLE)
+
+
+@cache
+def beginning(name: str, steps: int) -> Cycle:
+    whole = load_cycle(name)
+    inside = slice(steps + 1)
+    return Cycle(name, whole.time_s[inside], whole.speed_mps[inside], whole.grade[inside])
+
+
+def controller(cycle: Cycle, vehicle: Vehicle = VEHICLE, on_off: str = "relaxed") -> MhNlp:
+    chosen = MhNlpSettings.model_validate({"on_off": on_off})
+    truth = Trace.of(cycle, vehicle)
+    return MhNlp(Plant(vehicle), truth, truth, chosen, ControllerSettings().rule_based)
+
+
+@given(st.floats(0.0, 71e3))
+@settings(deadline=None)
+def test_fuel_map(power_w: float) -> None:
+    # rounding and interpolation: the thermal and the PWA error are of the same size
+    exact = float(EQUATIONS.fuel_g_per_s(power_w)[0])
+    assert float(MAPS.fuel_g_per_s(power_w)) == pytest.approx(exact, abs=0.002)
+
+
+@given(st.floats(0.4, 0.8), st.floats(-25e3, 27e3))
+@settings(deadline=None)
+def test_battery_map(soc: float, power_w: float) -> None:
+    exact = float(EQUATIONS.internal_w(soc, power_w))
+    # rounding over 0.01 of SOC is worth some 0.1 % of U and R, most where the power is near its peak
+    assert float(MAPS.internal_w(soc, power_w)) == pytest.approx(exact, abs=2.0 + 2e-3 * abs(exact))
+
+
+@given(st.floats(20.0, 95.0))
+@settings(deadline=None)
+def test_thermal_maps(t_cl_degc: float) -> None:
+    # the corners are 0.1 K deep: 14.5 kW over 5 K, alpha' 0.004 / K
+    assert float(MAPS.radiator_w(t_cl_degc)) == pytest.approx(
+        float(EQUATIONS.radiator_w(t_cl_degc)), abs=300.0
+    )
+    assert float(MAPS.alpha(t_cl_degc)) == pytest.approx(
+        float(EQUATIONS.alpha(t_cl_degc)), abs=4e-4
+    )
+    assert float(MAPS.cabin_w(t_cl_degc)) == pytest.approx(1500.0, abs=0.1)
+
+
+def test_rounded_table_keeps_convexity_and_ends() -> None:
+    x, y = np.array([0.0, 1.0, 3.0, 4.0]), np.array([0.0, 0.5, 4.0, 8.0])
+    table = RoundedTable(x, y, 0.1)
+    at = np.linspace(-2.0, 6.0, 401)
+    values = np.array([float(table(float(point))) for point in at])
+    assert np.all(np.diff(values, 2) > -1e-12)
+    inside = (at >= 0.0) & (at <= 4.0)
+    # w / 2 times the change of slope, at each of two corners
+    assert np.abs(values - np.interp(at, x, y))[inside].max() < 0.05 * (1.25 + 2.25)
+    slopes = (values[1] - values[0], values[-1] - values[-2])
+    np.testing.assert_allclose(np.array(slopes) / 0.02, [0.5, 4.0], atol=0.01)
+
+
+def _surplus_k(
+    end: float, equations: Equations, begin: float, h: float, heating: tuple[float, float, float]
+) -> float:
+    """Imbalance of eq. (3) over a stage at its mean temperature, K."""
+    fuel, power, speed_mps = heating
+    th, mean = equations.vehicle.thermal, 0.5 * (begin + end)
+    burnt_w = equations.lhv_j_per_g * float(equations.alpha(mean)) * fuel
+    heat = (1.0 - th.exhaust_share) * (burnt_w - power)
+    heat -= float(equations.ua_w_per_k(speed_mps)) * (mean - th.t_amb_degc)
+    heat -= float(equations.radiator_w(mean) + equations.cabin_w(mean))
+    return begin + h * heat / th.heat_capacity_j_per_k - end
+
+
+def rolled(vehicle: Vehicle, plan: NlpPlan, soc: float, t_cl: float) -> tuple[float, float, float]:
+    """Final SOC and coolant, and fuel, of a plan's engine powers by the exact equations."""
+    equations, road, x = Equations(vehicle), plan.stages, plan.x
+    fuel_g = 0.0
+    for k in range(len(road.duration_s)):
+        h, net, sigma = road.duration_s[k], road.net_w[k], x[k, NlpVar.ON]
+        power = plan.power_on_w(k)
+        drawn = sigma * equations.internal_w(soc, net - power)
+        drawn += (1.0 - sigma) * road.internal_off_w[k]
+        soc -= h * float(drawn) / (float(equations.voltage_v(soc)) * equations.charge_c)
+        fuel = sigma * float(equations.fuel_g_per_s(power)[0])
+
+        heating = (fuel, sigma * power, float(road.speed_mps[k]))
+        end = brentq(
+            _surplus_k, t_cl - 60.0, t_cl + 60.0, args=(equations, t_cl, float(h), heating)
+        )
+        fuel_g += h * float(equations.alpha(0.5 * (t_cl + end))) * fuel
+        t_cl = end
+    return soc, t_cl, fuel_g
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("nycc", {}),
+        ("hwfet", {"trip.t_cl_init_degc": 88.0}),
+        ("udds", {"trip.t_cl_init_degc": 41.0, "trip.soc_init": 0.5}),
+    ],
+)
+def test_plan_obeys_the_exact_equations(name: str, changes: dict[str, object]) -> None:
+    vehicle = VEHICLE.with_settings(changes)
+    plan = controller(beginning(name, 400), vehicle).plan(
+        0, vehicle.trip.soc_init, vehicle.trip.t_cl_init_degc
+    )
+    assert plan.solved
+    soc, t_cl, fuel_g = rolled(vehicle, plan, vehicle.trip.soc_init, vehicle.trip.t_cl_init_degc)
+    x = plan.x
+    # SOC: the mean over a stage against its start in U and R, and the rounded corners
+    assert x[-1, NlpVar.SOC] == pytest.approx(soc, abs=2e-3)
+    assert x[-1, NlpVar.T_CL] == pytest.approx(t_cl, abs=0.1)
+    prices = 5.0 * x[:, NlpVar.T_SLACK].sum()
+    assert plan.cost_g - prices == pytest.approx(fuel_g, rel=3e-3)
+    assert x[-1, NlpVar.SOC] >= vehicle.trip.soc_init - 1e-6
+    assert x[:, NlpVar.ON].min() >= 0.0
+    assert x[:, NlpVar.ON].max() <= 1.0 + 1e-6
+
+
+def test_warm_equals_cold() -> None:
+    driver = controller(beginning("nycc", 300))
+    for step, soc, t_cl_degc in ((50, 0.6, 48.0), (150, 0.62, 52.0), (250, 0.59, 45.0)):
+        for before in range(step - 2, step):
+            driver.plan(before, soc, t_cl_degc)
+        cold = driver.solver.solve(driver.preview.at(step), soc, t_cl_degc)
+        warm = driver.plan(step, soc, t_cl_degc)
+        assert warm.solved
+        assert cold.solved
+        assert warm.cost_g == pytest.approx(cold.cost_g, abs=1e-3)
+
+
+def test_price_makes_short_stages_integral() -> None:
+    """Where the relaxed on-share is fractional, the homotopy takes it to 0 or 1, at a price."""
+    cycle = beginning("hwfet", 300)
+    relaxed, priced = controller(cycle), controller(cycle, on_off="homotopy")
+    tried = 0
+    for step in range(0, 300, 3):
+        before = relaxed.plan(step, 0.6, 55.0)
+        share = before.z[:5, NlpVar.ON]
+        if np.all(np.minimum(share, 1.0 - share) < 0.1):
+            continue
+        after = priced.plan(step, 0.6, 55.0)
+        end = after.z[:5, NlpVar.ON]
+        assert np.minimum(end, 1.0 - end).max() < np.minimum(share, 1.0 - share).max()
+        assert after.cost_g > before.cost_g - 1e-3
+        tried += 1
+        if tried == 3:
+            break
+    assert tried
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"trip.t_cl_init_degc": 89.5},
+        {"trip.t_cl_init_degc": 30.0},
+        {"trip.soc_init": 0.42},
+        {"trip.soc_init": 0.79},
+    ],
+)
+def test_closed_loop(changes: dict[str, object]) -> None:
+    """It drives from any corner, without help, and within limits that it did not start beyond."""
+    vehicle, cycle = VEHICLE.with_settings(changes), beginning("udds", 200)
+    plant, truth = Plant(vehicle), Trace.of(cycle, vehicle)
+    summary = simulate(cycle, make_mh_nlp(plant, truth), vehicle).summary()
+    assert summary["controller"] == "mh-nlp"
+    assert summary["solver"]["name"] == "ipopt"
+    assert summary["fallback_steps"] == 0
+    assert summary["violations"]["soc"] == 0.0
+    assert summary["violations"]["power_w"] == 0.0
+    if vehicle.trip.t_cl_init_degc > 40.0:
+        assert summary["violations"]["t_cl_degc"] == 0.0
+
+
+def test_ladder() -> None:
+    cycle = beginning("nycc", 60)
+    driver = controller(cycle)
+    truth = Trace.of(cycle, VEHICLE)
+    solve = driver.solver.solve
+
+    def observe(step: int) -> Observation:
+        demand, speed = float(truth.demand_w[step]), float(truth.speed_mps[step])
+        return Observation(step, 0.6, 50.0, False, demand, speed)
+
+    assert driver.decide(observe(0)).fallback == ""
+    driver.solver.solve = (  # type: ignore[method-assign]
+        lambda *given, **named: replace(solve(*given, **named), solved=False)
+    )
+    rungs = [driver.decide(observe(step)).fallback for step in range(1, 7)]
+    assert rungs == ["shifted plan"] * 3 + ["rule-based"] * 3
+    driver.solver.solve = solve  # type: ignore[method-assign]
+    assert driver.decide(observe(7)).fallback == ""
+
+
+def test_comparison() -> None:
+    cycle = beginning("nycc", 200)
+    comparison = compare([cycle], VEHICLE, every=10)
+    result = json.loads(json.dumps(comparison.to_dict()))
+    (open_loop,), (closed_loop,) = result["open_loop"], result["closed_loop"]
+    assert open_loop["states"] == 20
+    assert open_loop["nlp_unsolved"] == 0
+    assert open_loop["same_on_off_share"] > 0.9
+    # what the PWA curves, the linearised alpha and a limited number of iterations cost together
+    assert open_loop["planned_fuel_percent"]["max"] < 2.0
+    assert open_loop["soc"]["median"] < 0.01
+    assert abs(closed_loop["fuel_difference_percent"]) < 1.0
+    assert closed_loop["qp"]["controller"] == "mh-qp"
+    assert set(closed_loop["time_ratio"]) == {"median", "p99", "max"}
+
+
+def test_comparison_notices_a_coarse_model() -> None:
+    cycle = beginning("nycc", 60)
+    coarse = ControllerSettings().with_settings({"mh_qp.pwa.fuel_g_per_s": 0.2})
+    fine_plan, coarse_plan = (
+        compare_open_loop(cycle, VEHICLE, every=60, settings=chosen).pairs[0]
+        for chosen in (None, coarse)
+    )
+    assert coarse_plan.nlp_fuel_g == pytest.approx(fine_plan.nlp_fuel_g, rel=1e-6)
+    fine, rough = (abs(p.qp_fuel_g - p.nlp_fuel_g) for p in (fine_plan, coarse_plan))
+    assert rough > 2.0 * fine
+
+
+def test_missing_casadi_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "casadi", None)
+    with pytest.raises(QpmpcError, match=r"pip install 'qpmpc-iptm\[verification\]'") as error:
+        SmoothMaps(VEHICLE).alpha(50.0)
+    assert "\n" not in str(error.value)
