@@ -55,7 +55,7 @@ def test_fuel_map(power_w: float) -> None:
 @settings(deadline=None)
 def test_battery_map(soc: float, power_w: float) -> None:
     exact = float(EQUATIONS.internal_w(soc, power_w))
-    # rounding over 0.01 of SOC is worth some 0.1 % of U and R, most where the power is near its peak
+    # rounding over 0.01 of SOC is worth some 0.1 % of U and R, most where power is near its peak
     assert float(MAPS.internal_w(soc, power_w)) == pytest.approx(exact, abs=2.0 + 2e-3 * abs(exact))
 
 
