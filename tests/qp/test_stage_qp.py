@@ -165,7 +165,7 @@ def test_scaling_leads_back():
 
 
 def test_forecast_stages_keep_a_reserve_of_charge_and_known_ones_do_not():
-    qp = _qp()
+    qp = _qp(soc_reserve=0.5)
     stages = BUILDER.at(0)
     data = qp.update(stages, 0.6, 60.0, _about())
     lower = (data.lower / data.scaling.row).reshape(qp.stages, -1)

@@ -185,7 +185,7 @@ def robustness_picture(study: Study) -> Picture:
         axes.set_yticks(range(len(models)), models)
         axes.invert_yaxis() if axes is grid.flat[0] else None
         bad = sum(run.violates for run in runs)
-        axes.set_title(f"{cycle}: {len(runs)} forecasts, {bad} with a violation", fontsize=9)
+        axes.set_title(f"{cycle}: {bad} of {len(runs)} violate a limit", fontsize=9)
         axes.set_xlabel("loss of fuel, %")
         tidy(axes)
     figure.suptitle(f"{OURS} with wrong forecasts: loss to its perfect-forecast self", fontsize=11)

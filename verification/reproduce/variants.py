@@ -43,6 +43,8 @@ VARIANTS = (
     Variant(OPTIMUM, OPTIMUM),
 )
 
+LATE_HEAT = "rules, heat request 42/44 °C"
+
 # Each asks one question about a distance from dynamic programming or a saving.
 EXPERIMENTS = (
     Variant(
@@ -74,7 +76,7 @@ EXPERIMENTS = (
         {"rule_based.heat_power_w": 8e3},
     ),
     Variant(
-        "rules, heat request 42/44 °C",
+        LATE_HEAT,
         RULES,
         {"rule_based.heat_on_degc": 42.0, "rule_based.heat_off_degc": 44.0},
     ),
