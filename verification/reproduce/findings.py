@@ -99,8 +99,8 @@ def _thermal(study: Study) -> list[str]:
         kelvin_mg = 1e3 * float(solution.t_cl_costate_g_per_k[0])
         text.append(
             f"{cycle.name}: at departure a kelvin of coolant is worth {kelvin_mg:.0f} mg of fuel "
-            f"to DP, and a hundredth of SOC {10 * float(solution.soc_costate_g[0]):.0f} mg. Both are "
-            "paid back later: heat by a smaller alpha and by seconds without the engine."
+            f"to DP, and a hundredth of SOC {10 * float(solution.soc_costate_g[0]):.0f} mg. Both "
+            "are paid back later: heat by a smaller alpha and by seconds without the engine."
         )
     return text
 
