@@ -89,7 +89,7 @@ def checks_of(study: Study) -> list[Check]:
             Check(
                 f"{name}: {OURS} close to dynamic programming",
                 f"at most {most} % above",
-                f"{above:+.2f} %",
+                f"{above:+.3f} %",
                 above <= most,
             )
         )

@@ -16,7 +16,7 @@ from qpmpc.verification.reproduce.variants import (
     baseline,
 )
 
-CLOSE_POINTS = 1.0  # savings within this many percentage points count as agreeing
+CLOSE_SHARE = 0.25  # savings within this share of the printed one count as agreeing
 
 
 def findings(study: Study, checks: list[Check]) -> list[tuple[str, list[str]]]:
@@ -73,7 +73,7 @@ def _savings(study: Study, agreeing: bool) -> list[str]:
         if (cycle, label) not in study.rows:
             continue
         saving = study.rows[cycle, label]["saving_vs_rule_percent"]
-        if (abs(saving - printed) <= CLOSE_POINTS) == agreeing:
+        if (abs(saving - printed) <= CLOSE_SHARE * printed) == agreeing:
             text.append(
                 f"{cycle}: {label} saves {saving:.1f} % over the rules, the paper {printed:.1f} %."
             )
