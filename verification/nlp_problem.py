@@ -59,8 +59,8 @@ class NlpProblem:
       (paper eq. 1; smaller where the friction brakes take what a full battery cannot), with
       U I_off = l_k + G(SOC, P0_k) - G(SOC_init, P0_k) and l_k the stage's mean off-power
     - C (T_k - T_{k-1}) = h_k [(1 - x)(LHV alpha(T) F_k - E_k) - UA(v_k)(T - T_amb)
-      - Q_rad(T) - Q_heat(T)] (eq. 3) with F = sigma f(P), E = sigma P
-    - the limits of eqs. (9)-(11), T and SOC in the maps being the mean over the stage
+      - Q_rad(T_k) - Q_heat(T)] (eq. 3) with F = sigma f(P), E = sigma P
+    - the limits of eqs. (9)-(11), T and SOC without index being the mean over the stage
 
     The variables are sigma and D with P = P_least + D / sigma: in this perspective form the program
     is convex but for alpha(T) and the voltage, which a product sigma P is not.
@@ -139,7 +139,8 @@ class NlpProblem:
         lhv_j_per_g = vehicle.engine.lhv_j_per_kg * 1e-3
         heat = (1.0 - th.exhaust_share) * (lhv_j_per_g * fuel - sigma * power)
         heat -= (th.ua0_w_per_k + th.ua1_w_per_k_per_mps * speed_mps) * (t_cl - th.t_amb_degc)
-        heat -= maps.radiator_w(t_cl) + maps.cabin_w(t_cl)
+        # the thermostat settles within a long stage: at its mean it would open too late
+        heat -= maps.radiator_w(x[NlpVar.T_CL]) + maps.cabin_w(t_cl)
         soc_gain = before[0] - h * current / (3600.0 * vehicle.battery.capacity_ah) - x[NlpVar.SOC]
         t_cl_gap = before[1] + h * heat / th.heat_capacity_j_per_k - x[NlpVar.T_CL]
         return ca.Function("stage", [before, x, road], [h * fuel, soc_gain, t_cl_gap])

@@ -1,11 +1,17 @@
-"""The multi-horizon QP: structure once, values each step."""
+"""The multi-horizon QP: structure once, values each step; and its twin in cvxpy."""
+
+from typing import TYPE_CHECKING, Any
 
 from qpmpc.qp.scaling import Scaling, ScalingSettings
 from qpmpc.qp.stage_qp import Linearisation, QpData, QpSettings, StageQp
 from qpmpc.qp.structure import VARS, QpStructure, Rows, Var
 
+if TYPE_CHECKING:
+    from qpmpc.qp.cvxpy_twin import CvxpyTwin
+
 __all__ = [
     "VARS",
+    "CvxpyTwin",
     "Linearisation",
     "QpData",
     "QpSettings",
@@ -16,3 +22,12 @@ __all__ = [
     "StageQp",
     "Var",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the twin when it is asked for: cvxpy takes a second to load."""
+    if name == "CvxpyTwin":
+        from qpmpc.qp.cvxpy_twin import CvxpyTwin
+
+        return CvxpyTwin
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -88,13 +88,13 @@ def test_rounded_table_keeps_convexity_and_ends() -> None:
 def _surplus_k(
     end: float, equations: Equations, begin: float, h: float, heating: tuple[float, float, float]
 ) -> float:
-    """Imbalance of eq. (3) over a stage at its mean temperature, K."""
+    """Imbalance of eq. (3) over a stage, K, the thermostat being where the stage ends."""
     fuel, power, speed_mps = heating
     th, mean = equations.vehicle.thermal, 0.5 * (begin + end)
     burnt_w = equations.lhv_j_per_g * float(equations.alpha(mean)) * fuel
     heat = (1.0 - th.exhaust_share) * (burnt_w - power)
     heat -= float(equations.ua_w_per_k(speed_mps)) * (mean - th.t_amb_degc)
-    heat -= float(equations.radiator_w(mean) + equations.cabin_w(mean))
+    heat -= float(equations.radiator_w(end) + equations.cabin_w(mean))
     return begin + h * heat / th.heat_capacity_j_per_k - end
 
 

@@ -1,0 +1,103 @@
+"""A QP as plain matrices in SI units, and how far two of them differ whatever their row order."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from qpmpc.qp.stage_qp import QpData
+from qpmpc.qp.structure import QpStructure
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Matrices:
+    """min 1/2 x'Px + q'x  s.t.  equal x = equal_to,  upper x <= upper_to, in grams and SI units.
+
+    x holds the variables stage by stage, in the order of `Var`. P may be dense.
+    """
+
+    gradient: Floats
+    hessian: Floats
+    equal: Floats
+    equal_to: Floats
+    upper: Floats
+    upper_to: Floats
+
+    def value(self, x: Floats) -> float:
+        """Cost at x, g, but for its constant."""
+        return float(0.5 * x @ self.hessian @ x + self.gradient @ x)
+
+    def violation(self, x: Floats, column: Floats) -> float:
+        """Largest violation of a row at x, rows of unit norm in the units `column`."""
+        equal, equal_to = _unit_rows(self.equal, self.equal_to, column)
+        upper, upper_to = _unit_rows(self.upper, self.upper_to, column)
+        z = x / column
+        return float(max(np.abs(equal @ z - equal_to).max(), (upper @ z - upper_to).max()))
+
+
+def matrices_of(structure: QpStructure, data: QpData) -> Matrices:
+    """Undo the scaling of the product's QP, and give each side of a row its own row."""
+    scaling = data.scaling
+    a = structure.matrix_of(data.a_data).toarray() / scaling.row[:, None] / scaling.column
+    lower, upper = data.lower / scaling.row, data.upper / scaling.row
+    equal = lower == upper
+    above, below = ~equal & np.isfinite(upper), ~equal & np.isfinite(lower)
+    return Matrices(
+        gradient=data.q / scaling.column / scaling.cost,
+        hessian=np.diag(data.hessian / scaling.column**2 / scaling.cost),
+        equal=a[equal],
+        equal_to=lower[equal],
+        upper=np.concatenate([a[above], -a[below]]),
+        upper_to=np.concatenate([upper[above], -lower[below]]),
+    )
+
+
+def difference(one: Matrices, other: Matrices, column: Floats) -> float:
+    """Largest difference of any entry of cost and rows.
+
+    Variables are counted in the units `column`; rows are brought to unit norm, and each is
+    compared with the nearest row of the other program. Gradient and Hessian are relative to their
+    largest entries. The result is infinite if the numbers of rows differ, or two rows share a
+    partner.
+    """
+    worst = _relative(one.gradient * column, other.gradient * column)
+    outer = np.multiply.outer(column, column)
+    worst = max(worst, _relative(one.hessian * outer, other.hessian * outer))
+    for kind in ("equal", "upper"):
+        rows = [
+            np.column_stack(_unit_rows(getattr(m, kind), getattr(m, f"{kind}_to"), column))
+            for m in (one, other)
+        ]
+        if kind == "equal":
+            rows = [_signed(r) for r in rows]
+        worst = max(worst, _unmatched(*rows))
+    return float(worst)
+
+
+def _relative(one: Floats, other: Floats) -> float:
+    size = max(float(np.abs(one).max()), float(np.abs(other).max()))
+    return float(np.abs(one - other).max()) / size if size else 0.0
+
+
+def _unit_rows(rows: Floats, right: Floats, column: Floats) -> tuple[Floats, Floats]:
+    scaled = rows * column
+    norm = np.linalg.norm(scaled, axis=1)
+    return scaled / norm[:, None], right / norm
+
+
+def _signed(rows: Floats) -> Floats:
+    """Equalities have no sign: make the largest entry of the left side positive."""
+    largest = np.abs(rows[:, :-1]).argmax(axis=1)
+    return np.asarray(rows * np.sign(rows[np.arange(len(rows)), largest])[:, None])
+
+
+def _unmatched(one: Floats, other: Floats) -> float:
+    if len(one) != len(other):
+        return float("inf")
+    _, partner = KDTree(other).query(one)
+    if len(np.unique(partner)) != len(one):
+        return float("inf")
+    return float(np.abs(one - other[partner]).max())
