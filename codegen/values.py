@@ -165,7 +165,7 @@ def _plant(vehicle: Vehicle, line: OptimalLine, maps: BatteryMaps) -> dict[str, 
     return {
         "engine_max_w": engine.power_max_w,
         "engine_min_w": engine.power_min_w,
-        "lhv_j_per_g": engine.lhv_j_per_kg * 1e-3,
+        "lhv_j_per_g": engine.lhv_j_per_g,
         "fuel_step_w": float(line.power_w[1] - line.power_w[0]),
         "cold_k": cold.k,
         "cold_hot_degc": cold.hot_degc,

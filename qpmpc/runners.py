@@ -10,13 +10,11 @@ from qpmpc.controllers.replay import Replay
 from qpmpc.cycles import Cycle
 from qpmpc.errors import InputError
 from qpmpc.results import Run
-from qpmpc.simulate import Progress, simulate
+from qpmpc.simulate import Progress, as_fraction, simulate
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.plant import Command
 
 Planner = Callable[[Cycle, Vehicle, ControllerSettings, Progress | None], list[Command]]
-
-PROGRESS_PARTS = 1000
 
 
 def _dp(
@@ -24,10 +22,7 @@ def _dp(
 ) -> list[Command]:
     from qpmpc.verification.dynamic_programming import solve_dp
 
-    def report(fraction: float) -> None:
-        if progress is not None:
-            progress(round(fraction * PROGRESS_PARTS), PROGRESS_PARTS)
-
+    report = None if progress is None else as_fraction(progress)
     plan = solve_dp(cycle, vehicle, settings.dp, report)
     pairs = zip(plan.engine_on.tolist(), plan.p_eng_w.tolist(), strict=True)
     return [Command(on, p_eng_w) for on, p_eng_w in pairs]

@@ -12,6 +12,16 @@ from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.plant import Plant
 
 Progress = Callable[[int, int], None]
+FRACTION_PARTS = 1000
+
+
+def as_fraction(progress: Progress) -> Callable[[float], None]:
+    """Turn a progress that counts parts into one that takes the finished fraction."""
+
+    def report(fraction: float) -> None:
+        progress(round(fraction * FRACTION_PARTS), FRACTION_PARTS)
+
+    return report
 
 
 def simulate(

@@ -109,7 +109,7 @@ class CasadiQp:
         """Cost in g, what must be zero, what must not be negative."""
         ca, vehicle, settings = casadi(), self.vehicle, self.settings
         battery, engine, th = vehicle.battery, vehicle.engine, vehicle.thermal
-        lhv_j_per_g = engine.lhv_j_per_kg * 1e-3
+        lhv_j_per_g = engine.lhv_j_per_g
         cost: Any = 0.0
         zero: list[Any] = []
         positive: list[Any] = []

@@ -136,7 +136,7 @@ class NlpProblem:
         drawn_w = sigma * maps.internal_w(soc, net_w - power) + (1.0 - sigma) * off_w
         current = drawn_w / maps.voltage_v(soc)
         fuel = maps.alpha(t_cl) * sigma * maps.fuel_g_per_s(power)  # g/s, of the cold engine
-        lhv_j_per_g = vehicle.engine.lhv_j_per_kg * 1e-3
+        lhv_j_per_g = vehicle.engine.lhv_j_per_g
         heat = (1.0 - th.exhaust_share) * (lhv_j_per_g * fuel - sigma * power)
         heat -= (th.ua0_w_per_k + th.ua1_w_per_k_per_mps * speed_mps) * (t_cl - th.t_amb_degc)
         # the thermostat settles within a long stage: at its mean it would open too late

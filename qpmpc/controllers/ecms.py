@@ -91,7 +91,7 @@ class Ecms:
         """Minimise H over the engine off and a grid of powers, then the safety layer."""
         vehicle = self._vehicle
         battery, thermal = vehicle.battery, vehicle.thermal
-        lhv_j_per_g = vehicle.engine.lhv_j_per_kg * 1e-3
+        lhv_j_per_g = vehicle.engine.lhv_j_per_g
         fuel_w = alpha_at(vehicle.cold_engine, seen.t_cl_degc) * self._fuel_g_per_s * lhv_j_per_g
         heat_w = (1.0 - thermal.exhaust_share) * (fuel_w - self._power_w)
         accepted_w = self._plant.battery.charge_limit_w(seen.soc, self._plant.step_s)

@@ -126,7 +126,7 @@ class MhQp:
         off_w = float(plan.stages.internal_off_w[0])
         on_part = battery.slope * (on * net_w - p_eng) + battery.intercept * on
         least_internal = float(on_part.max()) + (1.0 - on) * off_w
-        lhv_j_per_g = self._vehicle.engine.lhv_j_per_kg * 1e-3
+        lhv_j_per_g = self._vehicle.engine.lhv_j_per_g
         slack = abs(float(x[Var.FUEL]) - least_fuel) * lhv_j_per_g
         slack += abs(float(x[Var.INTERNAL]) - least_internal)
         size = abs(float(x[Var.FUEL])) * lhv_j_per_g + abs(float(x[Var.INTERNAL]))

@@ -76,7 +76,7 @@ class SafetyLayer:
         """Largest engine power whose heat into the coolant is at most `heat_w` (bisection)."""
         low, high = 0.0, self._vehicle.engine.power_max_w
         factor = alpha_at(self._vehicle.cold_engine, t_cl_degc)
-        factor *= self._vehicle.engine.lhv_j_per_kg * 1e-3
+        factor *= self._vehicle.engine.lhv_j_per_g
         share = 1.0 - self._vehicle.thermal.exhaust_share
         for _ in range(20):
             middle = 0.5 * (low + high)

@@ -137,7 +137,7 @@ class CvxpyTwin:
     def _coolant(self) -> list[Any]:
         """C (T - T_before) = h [(1 - x)(LHV alpha F - E) - UA (T - T_amb) - Q_heat] - radiator."""
         th, settings = self.vehicle.thermal, self.settings
-        lhv_j_per_g, share = self.vehicle.engine.lhv_j_per_kg * 1e-3, 1.0 - th.exhaust_share
+        lhv_j_per_g, share = self.vehicle.engine.lhv_j_per_g, 1.0 - th.exhaust_share
         before = self._before(Var.T_CL)
         mean = 0.5 * (before + self.t_cl_degc)
         # h alpha(T) F, expanded about T^ and F^

@@ -224,7 +224,7 @@ class StageQp:
         """Coolant balance about T^, F^; returns the cost weights of F and of T at both ends."""
         index, rows, th = self.structure.index, self.rows, self.vehicle.thermal
         h, share = stages.duration_s, 1.0 - th.exhaust_share
-        lhv_j_per_g = self.vehicle.engine.lhv_j_per_kg * 1e-3
+        lhv_j_per_g = self.vehicle.engine.lhv_j_per_g
         alpha = self.model.alpha(about.t_cl_degc)
         growth = self.model.alpha.active_slope(about.t_cl_degc) * about.fuel_g_per_s
         rate = h / th.heat_capacity_j_per_k  # K per W

@@ -67,6 +67,11 @@ class Engine(Section):
     torque_max_nm: Table
     start_fuel_g: NonNegative
 
+    @property
+    def lhv_j_per_g(self) -> float:
+        """Lower heating value in the unit that fuel rates are counted in."""
+        return self.lhv_j_per_kg * 1e-3
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         _require_increasing("friction_speed_rpm", self.friction_speed_rpm)

@@ -6,7 +6,7 @@ from typing import Any
 
 from qpmpc.cycles import Cycle
 from qpmpc.report.provenance import provenance
-from qpmpc.simulate import Progress
+from qpmpc.simulate import Progress, as_fraction
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.verification.benchmark.candidates import RIVAL_TOLERANCE, Candidate
 from qpmpc.verification.benchmark.drive import Drive, drive
@@ -57,7 +57,7 @@ def benchmark(
     drives, rows = [], []
     for cycle in cycles:
         report = next_job(f"{cycle.name}, dynamic programming")
-        solution = solve_dp(cycle, vehicle, progress=_thousandths(report))
+        solution = solve_dp(cycle, vehicle, progress=as_fraction(report))
         dp_fuel_g = float(solution.fuel_g.sum())
         for candidate in chosen:
             report = next_job(f"{cycle.name}, {candidate.label}")
@@ -69,12 +69,3 @@ def benchmark(
     grown = growth(vehicle)
     report(1, 1)
     return Benchmark(drives, rows, grown)
-
-
-def _thousandths(report: Progress) -> Callable[[float], None]:
-    """Turn a progress that counts steps into one that takes a fraction."""
-
-    def say(fraction: float) -> None:
-        report(round(1000 * fraction), 1000)
-
-    return say

@@ -80,7 +80,7 @@ def build_problem(cycle: Cycle, vehicle: Vehicle) -> Problem:
     low = np.minimum(low, engine.power_max_w)
     on_allowed = low <= high
     off_allowed = net <= battery.power_discharge_max_w
-    lhv_j_per_g = engine.lhv_j_per_kg * 1e-3
+    lhv_j_per_g = engine.lhv_j_per_g
     fuel_per_soc = plant.battery.energy_j(trip.soc_init) / (trip.eta_eq * lhv_j_per_g)
     maps = Maps(
         soc_grid=np.array(battery.soc_grid),
