@@ -128,7 +128,7 @@ MUTATIONS = [
     ),
     Mutation(
         "QP's heating value in kJ", StageQp, "_fill_coolant",
-        "lhv_j_per_kg * 1e-3", "lhv_j_per_kg * 1e-6", QP,
+        "engine.lhv_j_per_g", "engine.lhv_j_per_g * 1e-3", QP,
     ),
     Mutation(
         "a fuel row is dropped", StageQp, "_constant_bounds",
