@@ -1,5 +1,6 @@
 """Generator: the C project of one controller, from templates and the runtime's own files."""
 
+from collections.abc import Callable
 from importlib import import_module, resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc import __version__
-from qpmpc.codegen.values import Values
+from qpmpc.codegen.values import CONSTANTS, Values
 from qpmpc.errors import InputError
 from qpmpc.files import check_folder, write_text
 
@@ -84,6 +85,7 @@ def project_files(
     context = _context(values, target, precision)
     for output, template in {
         "mpc_config.h": "mpc_config.h.j2",
+        "mpc_constants.h": "mpc_constants.h.j2",
         "mpc_data.c": "mpc_data.c.j2",
         "Makefile": f"Makefile.{target}.j2",
         "README.md": "README.md.j2",
@@ -122,6 +124,10 @@ def _sorted(folder: Traversable) -> list[Traversable]:
     return sorted((p for p in folder.iterdir() if p.is_file()), key=lambda p: p.name)
 
 
+def _count_or(literal: Callable[[float], str], value: float) -> str:
+    return str(value) if isinstance(value, int) else literal(value)
+
+
 def _context(values: Values, target: Target, precision: Precision) -> dict[str, Any]:
     def literal(number: float) -> str:
         if precision == "f32":
@@ -143,6 +149,10 @@ def _context(values: Values, target: Target, precision: Precision) -> dict[str, 
         "precision": precision,
         "values": values,
         "sizes": values.sizes,
+        "constants": [
+            (module, [(name, _count_or(literal, value)) for name, value in names.items()])
+            for module, names in CONSTANTS.items()
+        ],
         "scalars": sorted(scalars.items()),
         "arrays": sorted((name, rows(array)) for name, array in values.arrays.items()),
         "stretch": _STRETCH.get(exponent, power),

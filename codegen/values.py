@@ -5,18 +5,46 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from qpmpc.controllers import mh_qp, planner, safety
 from qpmpc.controllers.mh_qp import PLAN_VALID_STEPS, MhQpSettings
 from qpmpc.controllers.planner import DEPARTURE_LINEARISATIONS, WARM_UP_STEPS
 from qpmpc.controllers.rule_based import RuleBasedSettings
 from qpmpc.errors import InputError
 from qpmpc.pwa.model import PwaModel
+from qpmpc.qp import stage_qp
 from qpmpc.qp.stage_qp import T_CL_MAX_MARGIN_K
+from qpmpc.solvers import base
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.engine import OptimalLine
 from qpmpc.vehicle.parameters import Vehicle
 
 EQUALITY_RHO_FACTOR = 1000.0  # OSQP's own, on rows whose bounds are closer than the next figure
 EQUALITY_WIDTH = 1e-4  # solver units
+
+# What the C code has in common with the Python controller, by module: names in C and their values.
+CONSTANTS: dict[str, dict[str, float]] = {
+    mh_qp.__name__: {"ON_THRESHOLD": mh_qp.ON_THRESHOLD},
+    planner.__name__: {
+        "COLDEST_DEGC": planner.COLDEST_DEGC,
+        "HOTTEST_DEGC": planner.HOTTEST_DEGC,
+        "DEPARTURE_FUEL_G_PER_S": planner.DEPARTURE_FUEL_G_PER_S,
+    },
+    safety.__name__: {
+        "SOC_MARGIN": safety.SOC_MARGIN,
+        "T_CL_MARGIN_K": safety.T_CL_MARGIN_K,
+        "T_CL_COOLING_K": safety.T_CL_COOLING_K,
+        "T_CL_NEAR_K": safety.T_CL_NEAR_K,
+        "BISECTIONS": safety.BISECTIONS,
+    },
+    stage_qp.__name__: {
+        "SHORTEST_SCALE_S": stage_qp.SHORTEST_SCALE_S,
+        "ROW_GAP_K": stage_qp.ROW_GAP,
+        "REACH_MARGIN_SOC": stage_qp.REACH_MARGIN_SOC,
+        "ACCURATE_STAGE_S": stage_qp.ACCURATE_STAGE_S,
+        "SIGMA_FORCED": stage_qp.SIGMA_FORCED,
+    },
+    base.__name__: {"LARGEST_PLAUSIBLE": base.LARGEST_PLAUSIBLE},
+}
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,11 @@
  */
 #include <stddef.h>
 
+#include "mpc_constants.h"
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-#define LARGEST_PLAUSIBLE REAL(1.0e6)
 #define UNLIMITED REAL(1.0e30)
 
 /* What stands before the first stage. */

@@ -5,18 +5,11 @@
  * T_k being the mean coolant temperature of stage k. Scaling: columns by unit and duration, rows
  * to unit norm, cost so that its largest fuel entry is 1. 
  */
+#include "mpc_constants.h"
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-#define SHORTEST_SCALE_S REAL(1.0)
-#define ROW_GAP_K REAL(1.0e-2) /* even a masked coolant row keeps two bounds */
-#define REACH_MARGIN_SOC REAL(1.0e-5)
-#define ACCURATE_STAGE_S REAL(1.0) /* a longer stage is forecast */
-#define SIGMA_FORCED REAL(0.99)
-#define COLDEST_DEGC REAL(0.0) /* where a linearisation point may lie */
-#define HOTTEST_DEGC REAL(100.0)
-#define DEPARTURE_FUEL_G_PER_S REAL(0.3)
 #define LEAST_COST REAL(1.0e-9)
 #define LEAST_SIZE_W REAL(1000.0)
 

@@ -3,15 +3,10 @@
  * Whatever the optimiser returned, the result is finite and in range. In order of rank, the last
  * word first: power limits of battery and engine; SOC limits; coolant limits.
  */
+#include "mpc_constants.h"
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
-
-#define SOC_MARGIN REAL(1e-5)     /* kept from the lower limit; a second's effect is known */
-#define T_CL_MARGIN_K REAL(0.02)  /* kept from the upper limit */
-#define T_CL_COOLING_K REAL(0.15) /* a second of engine off cools by less */
-#define T_CL_NEAR_K REAL(2.0)     /* no second warms by more */
-#define BISECTIONS 20
 
 /* Largest engine power whose heat into the coolant is at most heat_w. */
 static real_t power_for_heat_w(real_t heat_w, real_t t_cl_degc)

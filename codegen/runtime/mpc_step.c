@@ -1,11 +1,10 @@
 /* One second of the controller: plan, realise on/off, keep safe, degrade in steps. */
 #include <stddef.h>
 
+#include "mpc_constants.h"
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
-
-#define ON_THRESHOLD REAL(0.5) /* share of a second from which the engine runs */
 
 void mpc_init(mpc_state *state)
 {

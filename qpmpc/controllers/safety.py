@@ -8,6 +8,7 @@ SOC_MARGIN = 1e-5  # kept from the lower limit; what a step leads to is known ex
 T_CL_MARGIN_K = 0.02  # kept from the upper limit; what a step leads to is known exactly there
 T_CL_COOLING_K = 0.15  # a step of engine off cools the coolant by less than this
 T_CL_NEAR_K = 2.0  # no step warms the coolant by more than this
+BISECTIONS = 20  # of the engine power range: to some 0.05 W
 
 
 class SafetyLayer:
@@ -78,7 +79,7 @@ class SafetyLayer:
         factor = alpha_at(self._vehicle.cold_engine, t_cl_degc)
         factor *= self._vehicle.engine.lhv_j_per_g
         share = 1.0 - self._vehicle.thermal.exhaust_share
-        for _ in range(20):
+        for _ in range(BISECTIONS):
             middle = 0.5 * (low + high)
             heat = share * (factor * self._plant.line.fuel.at(middle) - middle)
             low, high = (middle, high) if heat <= heat_w else (low, middle)

@@ -1,12 +1,14 @@
 """The generator: same input, same bytes; every number from the settings; refusals in one line."""
 
 import hashlib
+import re
 from pathlib import Path
 
 import pytest
 
 from qpmpc.codegen import Values, generate, values_of
 from qpmpc.codegen.generate import project_files
+from qpmpc.codegen.values import CONSTANTS
 from qpmpc.controllers.factory import ControllerSettings
 from qpmpc.errors import InputError
 from qpmpc.vehicle import load_vehicle
@@ -51,6 +53,20 @@ def test_settings_reach_the_code() -> None:
     assert ".rho_equality = 250.0," in data
     assert ".slack_g_per_k = 7.5," in data
     assert ".rule_min_on_s = 9," in data
+
+
+def test_constants_shared_with_python_are_defined_by_the_generator_alone() -> None:
+    files = project_files(values(), "host", "f64")
+    generated = files.pop("mpc_constants.h")
+    code = "".join(files.values())
+    for names in CONSTANTS.values():
+        for name, value in names.items():
+            found = re.findall(rf"^#define {name} \((.+)\)$", generated, re.MULTILINE)
+            assert [float(text) for text in found] == [value], name
+            assert re.search(rf"\b{name}\b", code), f"{name} is not used"
+    written_by_hand = ["mpc_qp.c", "mpc_safety.c", "mpc_step.c", "mpc_admm.c"]
+    defined = {n for f in written_by_hand for n in re.findall(r"#define (\w+) ", files[f])}
+    assert not defined & {name for names in CONSTANTS.values() for name in names}
 
 
 def test_no_path_or_date_of_this_machine_in_the_code() -> None:
