@@ -32,7 +32,7 @@ def _dp(
 _PLANNERS: dict[str, Planner] = {"dp": _dp}
 
 # What some names need beyond the core: module to look for, extra that brings it.
-_NEEDS = {"dp": ("numba", "verification")}
+_NEEDS = {"dp": ("numba", "verification"), "mh-nlp": ("casadi", "verification")}
 
 
 def run_names() -> tuple[str, ...]:

@@ -50,6 +50,27 @@ def test_import_beside_the_other_distribution_fails(tmp_path: Path) -> None:
     assert "pip uninstall qpmpc" in run.stderr.strip().splitlines()[-1]
 
 
+def test_controllers_are_made_without_casadi() -> None:
+    """Only the nonlinear program takes it, and only when it is made."""
+    code = (
+        "import sys; sys.modules['casadi'] = None\n"
+        "from qpmpc.controllers.factory import controller_names\n"
+        "from qpmpc.cycles import load_cycle\n"
+        "from qpmpc.errors import QpmpcError\n"
+        "from qpmpc.simulate import simulate\n"
+        "from qpmpc.vehicle import load_vehicle\n"
+        "made = []\n"
+        "for name in controller_names():\n"
+        "    try: simulate(load_cycle('nycc'), name, load_vehicle())\n"
+        "    except QpmpcError as error: assert 'casadi' in str(error).lower()\n"
+        "    else: made.append(name)\n"
+        "print(set(controller_names()) - set(made))\n"
+        "print([name for name in sys.modules if 'mh_nlp' in name])\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.splitlines() == ["{'mh-nlp'}", "['qpmpc.verification.mh_nlp']"]
+
+
 def test_import_is_light() -> None:
     """`import qpmpc` alone loads no numerical library; the command line relies on it."""
     code = (

@@ -20,7 +20,7 @@ def compare(
     ],
     controllers: Annotated[
         str,
-        typer.Option(metavar="NAME,NAME,...", help="Such as dp; a wrong one lists all."),
+        typer.Option(metavar="NAME,NAME,...", help="Such as mh-nlp, dp; a wrong one lists all."),
     ] = DEFAULT_CONTROLLERS,
     vehicle: VehicleOption = "prius-nimh",
     set_: SetOption = None,

@@ -97,12 +97,19 @@ def _ecms(plant: Plant, truth: Trace, forecast: Trace, s: ControllerSettings) ->
     return Ecms(plant, s.ecms, s.rule_based.heat_power_w)
 
 
+def _mh_nlp(plant: Plant, truth: Trace, forecast: Trace, s: ControllerSettings) -> Controller:
+    from qpmpc.verification.mh_nlp import make_mh_nlp  # only here: it takes CasADi
+
+    return make_mh_nlp(plant, truth, forecast, s)
+
+
 _MAKERS: dict[str, Callable[[Plant, Trace, Trace, ControllerSettings], Controller]] = {
     "mh-qp": _mh_qp,
     "mh-qp-paper": _mh_qp_paper,
     "baseline-mpc": _baseline_mpc,
     "ecms": _ecms,
     "rule-based": _rule_based,
+    "mh-nlp": _mh_nlp,
 }
 
 

@@ -36,6 +36,8 @@ def compare_html(
     columns = filled(COMPARE_COLUMNS, rows)
     # the rules are also the last resort of other controllers
     names = {"rule_based", *(run.controller.replace("-", "_") for run in runs)}
+    if "mh_nlp" in names:
+        names.add("mh_qp")  # has its horizon and limits
     template = files("qpmpc.report").joinpath("compare.html.j2").read_text("utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     return environment.from_string(template).render(

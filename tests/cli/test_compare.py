@@ -50,6 +50,28 @@ def test_cycles_are_compared_apart(cli, strict_json, trip):
     assert runs[0]["saving_vs_rule_percent"] == runs[2]["saving_vs_rule_percent"] == 0.0
 
 
+def test_the_nonlinear_program_is_a_controller_like_others(cli, strict_json, trip, tmp_path):
+    done = cli("compare", trip, "--controllers", "rule-based,mh-nlp", "--out", tmp_path)
+    assert done.code == 0
+    rules, nlp = strict_json((tmp_path / "compare.json").read_text())["runs"]
+    qp = strict_json(cli("simulate", trip, "--json", "-").out)
+    assert nlp["controller"] == "mh-nlp"
+    assert nlp["fallback_steps"] == 0
+    # at most the PWA curves, the expansion and the rounding of the on-share lie between them
+    assert nlp["fuel_soc_balanced_g"] == pytest.approx(qp["fuel_soc_balanced_g"], rel=0.02)
+    assert nlp["saving_vs_rule_percent"] != rules["saving_vs_rule_percent"]
+    page = (tmp_path / "compare.html").read_text("utf-8")
+    assert "short_stages" in page  # the horizon, a setting of mh-qp that counts here too
+
+
+def test_settings_of_mh_qp_reach_the_nonlinear_program(cli, strict_json, trip):
+    command = ("simulate", trip, "--controller", "mh-nlp", "--json", "-")
+    low = strict_json(cli(*command).out)["soc_end"]
+    high = strict_json(cli(*command, "--set", "mh_qp.qp.terminal_low=1.005").out)["soc_end"]
+    assert low == pytest.approx(0.600, abs=0.002)
+    assert high == pytest.approx(0.603, abs=0.002)
+
+
 def test_out_has_everything(cli, strict_json, trip, tmp_path):
     folder = tmp_path / "results"
     done = cli("compare", trip, "--controllers", "rule-based,mh-qp", "--out", folder)

@@ -99,10 +99,11 @@ def test_folder_without_permission(cli, trip, tmp_path):
     assert_refused(cli("simulate", trip, "--out", folder / "results"), "permission")
 
 
-def test_missing_package_is_found_before_any_run(cli, trip, monkeypatch):
-    monkeypatch.setitem(sys.modules, "numba", None)
-    done = cli("compare", trip, "--controllers", "mh-qp,dp")
-    assert_refused(done, "dp", "numba", "qpmpc-iptm[verification]")
+@pytest.mark.parametrize(("name", "package"), [("dp", "numba"), ("mh-nlp", "casadi")])
+def test_missing_package_is_found_before_any_run(cli, trip, monkeypatch, name, package):
+    monkeypatch.setitem(sys.modules, package, None)
+    done = cli("compare", trip, "--controllers", f"mh-qp,{name}")
+    assert_refused(done, name, package, "qpmpc-iptm[verification]")
 
 
 def test_anything_else_is_one_line_and_exit_code_1(cli, trip, tmp_path, monkeypatch):

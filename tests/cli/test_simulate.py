@@ -19,7 +19,10 @@ INNER_KEYS = {
 }
 
 
-@pytest.mark.parametrize("controller", ["mh-qp", "mh-qp-paper", "rule-based"])
+SOLVERS = {"mh-qp": "osqp", "mh-qp-paper": "osqp", "mh-nlp": "ipopt", "rule-based": None}
+
+
+@pytest.mark.parametrize("controller", SOLVERS)
 def test_json_has_the_keys_of_the_contract(cli, strict_json, trip, controller):
     done = cli("simulate", trip, "--controller", controller, "--json", "-")
     assert done.code == 0
@@ -29,7 +32,7 @@ def test_json_has_the_keys_of_the_contract(cli, strict_json, trip, controller):
         assert set(run[key]) == inner
     assert run["controller"] == controller
     assert run["cycle"] == "short"
-    assert run["solver"]["name"] == (None if controller == "rule-based" else "osqp")
+    assert run["solver"]["name"] == SOLVERS[controller]
 
 
 def test_with_json_on_stdout_the_table_is_on_stderr(cli, trip):
