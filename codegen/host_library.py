@@ -6,13 +6,15 @@ import os
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from qpmpc.codegen.generate import Precision, generate, project_files
+from qpmpc.codegen.generate import Precision, project_files
 from qpmpc.codegen.values import Values
 from qpmpc.errors import QpmpcError
+from qpmpc.files import write_text
 
 ABI_VERSION = 1
 _ABI_NAMES = (
@@ -120,7 +122,18 @@ class HostLibrary:
 
 
 def build_host_library(values: Values, precision: Precision = "f64") -> HostLibrary:
-    """Generate, compile and load a controller; kept in the user's cache by its contents.
+    """Generate, compile and load a controller.
+
+    Raises
+    ------
+    CodegenError
+        If there is no compiler, or it fails.
+    """
+    return HostLibrary(compiled(project_files(values, "host", precision)), values, precision)
+
+
+def compiled(files: Mapping[str, str]) -> Path:
+    """Compile the files of a project, by name, into a library kept in the cache by its contents.
 
     Raises
     ------
@@ -131,12 +144,12 @@ def build_host_library(values: Values, precision: Precision = "f64") -> HostLibr
     if command is None:
         raise CodegenError("no C compiler found (tried $CC, cc, gcc, clang)")
     digest = hashlib.sha256(command.encode())
-    for name, text in project_files(values, "host", precision).items():
+    for name, text in files.items():
         digest.update(f"{name}\0{text}\0".encode())
     kept = _cache_folder() / f"{digest.hexdigest()[:24]}.so"
     if not kept.exists():
-        _build(values, precision, command, kept)
-    return HostLibrary(kept, values, precision)
+        _build(files, command, kept)
+    return kept
 
 
 def _cache_folder() -> Path:
@@ -153,10 +166,11 @@ def _cache_folder() -> Path:
     return folder
 
 
-def _build(values: Values, precision: Precision, command: str, kept: Path) -> None:
+def _build(files: Mapping[str, str], command: str, kept: Path) -> None:
     with tempfile.TemporaryDirectory(dir=kept.parent) as scratch:
         folder = Path(scratch)
-        generate(values, folder, "host", precision)
+        for name, text in files.items():
+            write_text(folder / name, text)
         flags = "-O3 -std=c99 -Wall -Wextra -Wconversion -Werror -ffp-contract=off -fPIC -shared"
         sources = sorted(file.name for file in folder.glob("*.c"))
         result = subprocess.run(
