@@ -28,6 +28,7 @@ CONSTANTS: dict[str, dict[str, float]] = {
         "COLDEST_DEGC": planner.COLDEST_DEGC,
         "HOTTEST_DEGC": planner.HOTTEST_DEGC,
         "DEPARTURE_FUEL_G_PER_S": planner.DEPARTURE_FUEL_G_PER_S,
+        "FAILURES_FORGIVEN": planner.FAILURES_FORGIVEN,
     },
     safety.__name__: {
         "SOC_MARGIN": safety.SOC_MARGIN,

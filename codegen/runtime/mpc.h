@@ -11,7 +11,8 @@
  * factorisation: a fixed amount of arithmetic.
  *
  * Without a departure the solver starts cold inside mpc_step: the rules drive until
- * MPC_WARM_UP_STEPS seconds' iterations have been spent. The same after a failure of the solver.
+ * MPC_WARM_UP_STEPS seconds' iterations have been spent. After a failure of the solver the next
+ * second starts from the last usable solution; after several in a row it starts cold.
  */
 #ifndef MPC_H
 #define MPC_H
@@ -56,7 +57,7 @@ enum {
 enum {
     MPC_BAD_MEASUREMENT = 1, /* soc, t_cl_degc, demand_w or speed_mps; the last good one counts */
     MPC_BAD_PREVIEW = 2,     /* short or long preview; no new plan is made */
-    MPC_SOLVER_FAILED = 4,   /* no usable solution; the solver starts cold */
+    MPC_SOLVER_FAILED = 4,   /* no usable solution */
     MPC_WARMING_UP = 8       /* the solver has not converged yet since a cold start */
 };
 

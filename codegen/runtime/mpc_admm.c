@@ -14,7 +14,6 @@
  */
 #include <stddef.h>
 
-#include "mpc_constants.h"
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
@@ -27,35 +26,6 @@ static const real_t nothing[MPC_VARS] = {REAL(0.0), REAL(0.0), REAL(0.0), REAL(0
 
 /* Indices within the dense part of a factor. */
 enum { IN_INTERNAL = 0, IN_FUEL = 1, IN_P_ENG = 2, IN_SOC = 3, IN_T_CL = 4 };
-
-/* A start at nothing: all variables 0, SOC and coolant temperature too. */
-void admm_clear(mpc_state *state)
-{
-    for (int32_t k = 0; k < MPC_STAGES; k++) {
-        for (int32_t i = 0; i < MPC_VARS; i++) {
-            state->stage[k].x[i] = REAL(0.0);
-        }
-        for (int32_t i = 0; i < MPC_ROWS; i++) {
-            state->stage[k].y[i] = REAL(0.0);
-        }
-    }
-    state->origin_soc = REAL(0.0);
-    state->origin_t_degc = REAL(0.0);
-}
-
-/* Short stages move up by 0 or 1 (in equal time); the last keeps its values; long stages keep
- * their place. */
-void admm_shift(mpc_state *state, int32_t by)
-{
-    for (int32_t k = 0; k < (MPC_SHORT - 1); k++) {
-        for (int32_t i = 0; i < MPC_VARS; i++) {
-            state->stage[k].x[i] = state->stage[k + by].x[i];
-        }
-        for (int32_t i = 0; i < MPC_ROWS; i++) {
-            state->stage[k].y[i] = state->stage[k + by].y[i];
-        }
-    }
-}
 
 /* value = Ax, row by row */
 static void multiply(const mpc_stage *stage, const real_t *x, const real_t *before, real_t *value)
@@ -81,50 +51,6 @@ static void multiply(const mpc_stage *stage, const real_t *x, const real_t *befo
     value[ROW_T_MIN] = (a->t_min[0] * x[VAR_T_CL]) + (a->t_min[1] * x[VAR_SLACK]);
     value[ROW_T_MAX] = (a->t_max[0] * x[VAR_T_CL]) + (a->t_max[1] * x[VAR_SLACK]);
     value[ROW_SLACK] = x[VAR_SLACK];
-}
-
-void admm_to_solver_units(mpc_state *state)
-{
-    for (int32_t k = 0; k < MPC_STAGES; k++) {
-        mpc_stage *const stage = &state->stage[k];
-        for (int32_t i = 0; i < MPC_VARS; i++) {
-            stage->x[i] /= stage->column[i];
-        }
-        for (int32_t i = 0; i < MPC_ROWS; i++) {
-            stage->y[i] *= state->cost / stage->row[i];
-        }
-        multiply(stage, stage->x, (k > 0) ? state->stage[k - 1].x : nothing, stage->z);
-    }
-}
-
-void admm_to_si_units(mpc_state *state)
-{
-    const real_t price = REAL(1.0) / state->cost;
-    for (int32_t k = 0; k < MPC_STAGES; k++) {
-        mpc_stage *const stage = &state->stage[k];
-        for (int32_t i = 0; i < MPC_VARS; i++) {
-            stage->x[i] *= stage->column[i];
-        }
-        for (int32_t i = 0; i < MPC_ROWS; i++) {
-            stage->y[i] *= stage->row[i] * price;
-        }
-    }
-}
-
-/* Solved or stopped at the limit with finite, plausible numbers; false for NaN. */
-int32_t admm_usable(const mpc_state *state)
-{
-    int32_t fine = 1;
-    for (int32_t k = 0; k < MPC_STAGES; k++) {
-        const mpc_stage *const stage = &state->stage[k];
-        for (int32_t i = 0; i < MPC_VARS; i++) {
-            fine &= (REAL_ABS(stage->x[i]) < LARGEST_PLAUSIBLE) ? 1 : 0;
-        }
-        for (int32_t i = 0; i < MPC_ROWS; i++) {
-            fine &= (REAL_ABS(stage->y[i]) < LARGEST_PLAUSIBLE) ? 1 : 0;
-        }
-    }
-    return fine;
 }
 
 /* Entries of the matrix in the rows of slack and on, and the lower triangle of the others. */
@@ -254,10 +180,14 @@ static void factorise_stage(mpc_stage *stage, stage_normal *m)
     }
 }
 
-void admm_factorise(mpc_state *state)
+/* All memory of this solver is in the state: there is nothing to claim. */
+void solver_claim(const mpc_state *state) { (void)state; }
+
+void solver_start(mpc_state *state)
 {
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         mpc_stage *const stage = &state->stage[k];
+        multiply(stage, stage->x, (k > 0) ? state->stage[k - 1].x : nothing, stage->z);
         stage_normal m;
         assemble(stage, &m);
         if (k < (MPC_STAGES - 1)) {
@@ -414,7 +344,7 @@ static void update(mpc_stage *stage, const real_t *before)
     project(product[ROW_SLACK], REAL(0.0), UNLIMITED, &z[ROW_SLACK], &y[ROW_SLACK]);
 }
 
-void admm_iterate(mpc_state *state, int32_t count)
+int32_t solver_iterate(mpc_state *state, int32_t count)
 {
     real_t unused[MPC_VARS] = {REAL(0.0), REAL(0.0), REAL(0.0), REAL(0.0),
                                REAL(0.0), REAL(0.0), REAL(0.0)};
@@ -434,4 +364,5 @@ void admm_iterate(mpc_state *state, int32_t count)
             update(&state->stage[k], (k > 0) ? state->stage[k - 1].work : nothing);
         }
     }
+    return 1;
 }

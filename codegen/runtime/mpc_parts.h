@@ -29,14 +29,21 @@ void qp_linearise_about_plan(mpc_state *state);
 void qp_update(mpc_state *state);
 real_t qp_relaxation_gap(const mpc_stage *stage);
 
-/* mpc_admm.c: the solver */
-void admm_clear(mpc_state *state);
-void admm_to_solver_units(mpc_state *state);
-void admm_to_si_units(mpc_state *state);
-void admm_shift(mpc_state *state, int32_t by);
-void admm_factorise(mpc_state *state);
-void admm_iterate(mpc_state *state, int32_t count);
-int32_t admm_usable(const mpc_state *state);
+/* mpc_iterate.c: the iterate */
+void iterate_clear(mpc_state *state);
+void iterate_shift(mpc_state *state, int32_t by);
+void iterate_to_solver_units(mpc_state *state);
+void iterate_to_si_units(mpc_state *state);
+int32_t iterate_usable(const mpc_state *state);
+void iterate_keep(mpc_state *state);
+int32_t iterate_restore(mpc_state *state);
+
+/* The solver. solver_claim: this controller is the one that uses it from now on. solver_start:
+ * takes values and iterate, in solver units. solver_iterate: moves the iterate on; returns 0 if the
+ * solver itself says that nothing came of it. */
+void solver_claim(const mpc_state *state);
+void solver_start(mpc_state *state);
+int32_t solver_iterate(mpc_state *state, int32_t count);
 
 /* mpc_safety.c, mpc_rules.c, mpc_check.c */
 mpc_command safety_admissible(mpc_command wish, const mpc_measured *seen);

@@ -94,6 +94,12 @@ typedef struct {
     real_t work[MPC_VARS];
 } mpc_stage;
 
+/* The iterate that a solve starts from, in SI units. */
+typedef struct {
+    real_t x[MPC_VARS];
+    real_t y[MPC_ROWS];
+} stage_iterate;
+
 /* Memory of the rules. */
 typedef struct {
     int32_t power_request;
@@ -111,6 +117,7 @@ typedef struct {
 
 typedef struct {
     mpc_stage stage[MPC_STAGES];
+    stage_iterate kept[MPC_STAGES]; /* to go back to if the solve fails */
     /* Where SOC and coolant temperature are counted from: the state at the start of the horizon.
      * Small numbers keep the digits of single precision for what the plan changes. */
     real_t origin_soc;
@@ -120,6 +127,7 @@ typedef struct {
     real_t old_p_eng_w[MPC_SHORT];
     int32_t old_age;                 /* steps since then; MPC_NO_PLAN if there is none */
     int32_t phase;
+    int32_t failures;                /* of the solver, in a row */
     int32_t solves;                  /* since the last cold start, up to MPC_WARM_UP_STEPS */
     int32_t is_under_way;            /* the first step has been made */
     int32_t depart_linearisation;    /* done of the departure */

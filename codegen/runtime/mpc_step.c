@@ -16,13 +16,14 @@ void mpc_init(mpc_state *state)
     state->phase = PHASE_COLD;
     state->good.soc = mpc_par.soc_init;
     state->good.t_cl_degc = mpc_par.t_cl_init_degc;
+    solver_claim(state);
 }
 
 /* Make the values of this second and start at the last solution, or at nothing. */
 static void prepare(mpc_state *state, const mpc_in *in)
 {
     if (state->phase == PHASE_COLD) {
-        admm_clear(state);
+        iterate_clear(state);
         qp_move_origin(state, state->good.soc, state->good.t_cl_degc);
         qp_linearise_cold(state);
     } else {
@@ -31,16 +32,17 @@ static void prepare(mpc_state *state, const mpc_in *in)
     }
     qp_road(state, in);
     qp_update(state);
-    admm_factorise(state);
-    admm_to_solver_units(state);
+    iterate_keep(state);
+    iterate_to_solver_units(state);
+    solver_start(state);
 }
 
 /* Bring the iterate back into SI units; returns whether it is usable. If not, the solver is cold:
  * nothing of a failed solve is kept. */
-static int32_t conclude(mpc_state *state)
+static int32_t conclude(mpc_state *state, int32_t solved)
 {
-    const int32_t usable = admm_usable(state);
-    admm_to_si_units(state);
+    const int32_t usable = solved & iterate_usable(state);
+    iterate_to_si_units(state);
     state->phase = (usable != 0) ? PHASE_RUNNING : PHASE_COLD;
     if (usable == 0) {
         state->solves = 0;
@@ -62,11 +64,11 @@ static void depart_slice(mpc_state *state, const mpc_in *in)
         state->depart_left = MPC_DEPARTURE_ITERATIONS;
         count = ((MPC_DEPARTURE_ITERATIONS - 1) % MPC_ITERATIONS) + 1;
     }
-    admm_iterate(state, count);
-    state->depart_left -= count;
+    const int32_t solved = solver_iterate(state, count);
+    state->depart_left = (solved != 0) ? (state->depart_left - count) : 0;
     if (state->depart_left == 0) {
         state->depart_linearisation++;
-        if (conclude(state) == 0) {
+        if (conclude(state, solved) == 0) {
             state->depart_linearisation = MPC_DEPARTURE_LINEARISATIONS;
         }
     }
@@ -94,14 +96,35 @@ int32_t mpc_depart(mpc_state *state, const mpc_in *in)
 static void move_on(mpc_state *state)
 {
     if (state->phase == PHASE_DEPARTING) {
-        (void)conclude(state); /* a departure cut short is a warm start like any other */
+        (void)conclude(state, 1); /* a departure cut short is a warm start like any other */
     }
-    admm_shift(state, state->is_under_way);
+    iterate_shift(state, state->is_under_way);
     if (state->old_age < MPC_NO_PLAN) {
         state->old_age++;
     }
     state->is_under_way = 1;
     state->depart_linearisation = MPC_DEPARTURE_LINEARISATIONS;
+}
+
+/* One solve. After a failure the iterate that it started from serves again, if there was one; after
+ * FAILURES_FORGIVEN more in a row it may be that iterate's fault, and the solver starts cold. */
+static int32_t solve(mpc_state *state, const mpc_in *in)
+{
+    const int32_t phase = state->phase;
+    const int32_t solves = state->solves;
+    prepare(state, in);
+    const int32_t usable = conclude(state, solver_iterate(state, MPC_ITERATIONS));
+    if (usable != 0) {
+        state->failures = 0;
+    } else {
+        const int32_t forgiven = (state->failures < FAILURES_FORGIVEN) ? 1 : 0;
+        if ((forgiven != 0) && (phase == PHASE_RUNNING) && (iterate_restore(state) != 0)) {
+            state->phase = PHASE_RUNNING;
+            state->solves = solves;
+        }
+        state->failures = (forgiven != 0) ? (state->failures + 1) : 0;
+    }
+    return usable;
 }
 
 static void keep_plan(mpc_state *state)
@@ -140,9 +163,7 @@ int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out)
     move_on(state);
     if (out->flags == 0) {
         out->iterations = MPC_ITERATIONS;
-        prepare(state, in);
-        admm_iterate(state, MPC_ITERATIONS);
-        if (conclude(state) == 0) {
+        if (solve(state, in) == 0) {
             out->flags |= MPC_SOLVER_FAILED;
         } else if (state->solves < MPC_WARM_UP_STEPS) {
             out->flags |= MPC_WARMING_UP;

@@ -15,6 +15,7 @@ Floats = NDArray[np.float64]
 COLDEST_DEGC, HOTTEST_DEGC = 0.0, 100.0  # where a linearisation point may lie
 DEPARTURE_LINEARISATIONS = 5
 DEPARTURE_FUEL_G_PER_S = 0.3
+FAILURES_FORGIVEN = 2  # unusable solutions in a row that do not cost the plan before them
 WARM_UP_STEPS = 5  # of K iterations; measured: fewer gain nothing, more leave the rules driving
 
 
@@ -62,6 +63,7 @@ class Planner:
         self.data: QpData | None = None
         self._plan_step = 0
         self._solves = 0
+        self._failures = 0
         self._is_set_up = False
         self._shift = preview.shift()
 
@@ -85,7 +87,8 @@ class Planner:
         """Spend one step's iterations on the QP of time step `step`.
 
         They start from the last usable plan, shifted by as many steps as have passed, or from
-        nothing after a reset. An unusable result leaves that plan in place.
+        nothing after a reset. An unusable result leaves that plan in place, until so many came in
+        a row that the plan may be the reason: then the next step starts from nothing.
         """
         stages = self.preview.at(step)
         if self.plan is None:
@@ -99,11 +102,16 @@ class Planner:
         if plan.solution.usable:
             self.plan, self._plan_step = plan, step
             self._solves += 1
+            self._failures = 0
+        elif self._failures < FAILURES_FORGIVEN:
+            self._failures += 1
+        else:
+            self.reset()
         return plan
 
     def reset(self) -> None:
         """Forget the last solution, as after a restart of the controller on the road."""
-        self.plan, self._solves = None, 0
+        self.plan, self._solves, self._failures = None, 0, 0
 
     @staticmethod
     def _cold_start(

@@ -8,12 +8,16 @@ import pytest
 
 from qpmpc.codegen import GeneratedController, generated_controller
 from qpmpc.codegen.host_library import compiler
+from qpmpc.codegen.values import CONSTANTS
 from qpmpc.controllers.base import Decision, Observation
 from qpmpc.controllers.factory import ControllerSettings, make_controller
 from qpmpc.controllers.mh_qp import MhQp
+from qpmpc.controllers.planner import FAILURES_FORGIVEN
 from qpmpc.cycles import load_cycle
-from qpmpc.preview import Trace
+from qpmpc.preview import StageBuilder, Trace
+from qpmpc.preview.stages import Stages
 from qpmpc.simulate import simulate
+from qpmpc.solvers import base
 from qpmpc.vehicle import Plant, load_vehicle
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
@@ -246,3 +250,58 @@ def test_state_forced_to_nan_is_noticed_and_the_controller_recovers() -> None:
     assert (failed.flags, failed.rung) == (SOLVER_FAILED, 1)
     rungs = [raw.step(k).rung for k in range(2, 8)]
     assert rungs[-1] == 0  # warmed up again
+
+
+class SpoiltPreview:
+    """A preview that is nonsense at one step, within what the input checks let pass.
+
+    Blocks of a day and more at full charging or driving power: the optimum is of the order of the
+    largest solution that counts as plausible.
+    """
+
+    def __init__(self, preview: StageBuilder, step: int) -> None:
+        self._preview, self._step = preview, step
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._preview, name)
+
+    def at(self, step: int) -> Stages:
+        stages = self._preview.at(step)
+        if step != self._step:
+            return stages
+        long = np.arange(len(stages.duration_s)) >= self._preview.settings.short_stages
+        return Stages(
+            np.where(long, 1e5, stages.duration_s),
+            np.where(long, 1e6, stages.net_w),
+            stages.speed_mps,
+            np.where(long, 1e6, stages.internal_off_w),
+        )
+
+
+SPOILT = 10
+
+
+def flags_after_a_spoilt_preview() -> list[int]:
+    """Flags of the steps from the spoilt one on; every decision equals Python's."""
+    plant, trace, ours, reference = pair("nycc")
+    ours._inputs._preview = SpoiltPreview(ours._inputs._preview, SPOILT)
+    reference.planner.preview = SpoiltPreview(reference.planner.preview, SPOILT)
+    flags = []
+    for mine, its in compare(plant, trace, ours, reference, SPOILT + 12):
+        assert_equal_decision(mine, its, power_w=1e-2)
+        flags.append(ours._out.flags)
+    return flags[SPOILT:]
+
+
+def test_after_one_unusable_solution_both_go_on_from_the_plan_before(monkeypatch) -> None:
+    strict = 3000.0  # solver units: what is right stays below 100, the spoilt solution does not
+    monkeypatch.setattr(base, "LARGEST_PLAUSIBLE", strict)
+    monkeypatch.setitem(CONSTANTS[base.__name__], "LARGEST_PLAUSIBLE", strict)
+    assert flags_after_a_spoilt_preview() == [SOLVER_FAILED] + [0] * 11
+
+
+def test_a_plan_from_which_solves_fail_again_and_again_is_given_up_by_both() -> None:
+    # the spoilt solution is just plausible, but nothing good can be reached from it
+    warming_up = [WARMING_UP] * 4
+    expected = [0, *([SOLVER_FAILED] * (FAILURES_FORGIVEN + 1)), *warming_up, *([0] * 4)]
+    assert flags_after_a_spoilt_preview() == expected

@@ -114,6 +114,15 @@ def test_one_failure_is_bridged_by_the_shifted_plan():
     assert run.summary()["violations"] == NO_VIOLATION
 
 
+def test_failures_beyond_those_forgiven_cost_the_plan():
+    failing = {*range(50, 53)}  # one more than is forgiven: cold from the next step on
+    run = _with_solver(load_cycle("nycc"), Flaky(failing))
+    rungs = run.trajectory.fallback[49:58]
+    # the old plan drives for three seconds, then the rules until the fifth solve since the reset
+    assert list(rungs) == ["shifted plan"] * 3 + ["rule-based"] * 4 + [""] * 2
+    assert run.summary()["violations"] == NO_VIOLATION
+
+
 class Dead(Osqp):
     """A solver that never gives a usable answer."""
 

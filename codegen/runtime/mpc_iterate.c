@@ -1,0 +1,112 @@
+/* The iterate, primal and dual: where it starts, its units, whether it may be acted on. The same for
+ * every solver. */
+#include "mpc_constants.h"
+#include "mpc_parts.h"
+#include "mpc_real.h"
+
+#define LARGEST_FINITE REAL(1.0e30)
+
+/* A start at nothing: all variables 0, SOC and coolant temperature too. */
+void iterate_clear(mpc_state *state)
+{
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
+        for (int32_t i = 0; i < MPC_VARS; i++) {
+            state->stage[k].x[i] = REAL(0.0);
+        }
+        for (int32_t i = 0; i < MPC_ROWS; i++) {
+            state->stage[k].y[i] = REAL(0.0);
+        }
+    }
+    state->origin_soc = REAL(0.0);
+    state->origin_t_degc = REAL(0.0);
+}
+
+/* Short stages move up by 0 or 1 (in equal time); the last keeps its values; long stages keep
+ * their place. */
+void iterate_shift(mpc_state *state, int32_t by)
+{
+    for (int32_t k = 0; k < (MPC_SHORT - 1); k++) {
+        for (int32_t i = 0; i < MPC_VARS; i++) {
+            state->stage[k].x[i] = state->stage[k + by].x[i];
+        }
+        for (int32_t i = 0; i < MPC_ROWS; i++) {
+            state->stage[k].y[i] = state->stage[k + by].y[i];
+        }
+    }
+}
+
+void iterate_to_solver_units(mpc_state *state)
+{
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
+        mpc_stage *const stage = &state->stage[k];
+        for (int32_t i = 0; i < MPC_VARS; i++) {
+            stage->x[i] /= stage->column[i];
+        }
+        for (int32_t i = 0; i < MPC_ROWS; i++) {
+            stage->y[i] *= state->cost / stage->row[i];
+        }
+    }
+}
+
+void iterate_to_si_units(mpc_state *state)
+{
+    const real_t price = REAL(1.0) / state->cost;
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
+        mpc_stage *const stage = &state->stage[k];
+        for (int32_t i = 0; i < MPC_VARS; i++) {
+            stage->x[i] *= stage->column[i];
+        }
+        for (int32_t i = 0; i < MPC_ROWS; i++) {
+            stage->y[i] *= stage->row[i] * price;
+        }
+    }
+}
+
+/* False for NaN. */
+static int32_t all_below(const mpc_state *state, real_t limit)
+{
+    int32_t fine = 1;
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
+        const mpc_stage *const stage = &state->stage[k];
+        for (int32_t i = 0; i < MPC_VARS; i++) {
+            fine &= (REAL_ABS(stage->x[i]) < limit) ? 1 : 0;
+        }
+        for (int32_t i = 0; i < MPC_ROWS; i++) {
+            fine &= (REAL_ABS(stage->y[i]) < limit) ? 1 : 0;
+        }
+    }
+    return fine;
+}
+
+/* Remember the iterate, in SI units, in case the solve that starts from it fails. */
+void iterate_keep(mpc_state *state)
+{
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
+        for (int32_t i = 0; i < MPC_VARS; i++) {
+            state->kept[k].x[i] = state->stage[k].x[i];
+        }
+        for (int32_t i = 0; i < MPC_ROWS; i++) {
+            state->kept[k].y[i] = state->stage[k].y[i];
+        }
+    }
+}
+
+/* Go back to what was kept; returns whether all of it is finite. */
+int32_t iterate_restore(mpc_state *state)
+{
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
+        for (int32_t i = 0; i < MPC_VARS; i++) {
+            state->stage[k].x[i] = state->kept[k].x[i];
+        }
+        for (int32_t i = 0; i < MPC_ROWS; i++) {
+            state->stage[k].y[i] = state->kept[k].y[i];
+        }
+    }
+    return all_below(state, LARGEST_FINITE);
+}
+
+/* Solved or stopped at the limit with finite, plausible numbers, in solver units. */
+int32_t iterate_usable(const mpc_state *state)
+{
+    return all_below(state, LARGEST_PLAUSIBLE);
+}
