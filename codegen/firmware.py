@@ -9,10 +9,11 @@ import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from time import monotonic
 from types import TracebackType
 from typing import Any, Self
 
-from qpmpc.codegen.generate import Precision, generate
+from qpmpc.codegen.generate import Precision, Solver, generate
 from qpmpc.codegen.host_library import CodegenError, structures
 from qpmpc.codegen.values import Values
 
@@ -28,6 +29,7 @@ ICOUNT_SHIFT = 6  # 2^6 ns of the machine's time an instruction
 INSTRUCTIONS_A_TICK = 1e9 / TIMER_HZ / 2**ICOUNT_SHIFT
 STACK_RESERVED_BYTES = 4096  # in cortex_m7.ld
 ANSWER_TIMEOUT_S = 300.0
+LOOK_EVERY_S = 0.2  # whether QEMU is still there
 _INIT, _DEPART, _STEP, _STOP = range(4)
 
 
@@ -69,7 +71,9 @@ class Footprint:
     stack_frames: int
 
 
-def build_firmware(values: Values, precision: Precision, folder: Path) -> Path:
+def build_firmware(
+    values: Values, precision: Precision, folder: Path, solver: Solver = "admm"
+) -> Path:
     """Generate and compile the firmware of a controller; returns the ELF file.
 
     Raises
@@ -78,10 +82,20 @@ def build_firmware(values: Values, precision: Precision, folder: Path) -> Path:
         If a tool is missing or the compiler fails, for instance because it does not fit.
     """
     require_tools()
-    generate(values, folder, "cortex-m7", precision)
-    result = subprocess.run(
-        ["make", "--silent", "-C", str(folder)], capture_output=True, text=True, check=False
-    )
+    generate(values, folder, "cortex-m7", precision, solver)
+    return make_firmware(folder)
+
+
+def make_firmware(folder: Path, *options: str) -> Path:
+    """Compile a generated project, with options of make; returns the ELF file.
+
+    Raises
+    ------
+    CodegenError
+        If the compiler fails, for instance because it does not fit.
+    """
+    command = ["make", "--silent", "-C", str(folder), *options]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
     if result.returncode:
         raise CodegenError(f"firmware does not build: {_first_error(result.stderr)}")
     return folder / "firmware.elf"
@@ -108,10 +122,11 @@ def stack_of(folder: Path) -> int:
     """Worst stack of `mpc_step`, from the compiler's frames along the deepest call chain.
 
     Calls are found in the disassembly; the C library's leaves (powf, memset, memcpy) have no
-    stack-usage file and count as `LIBRARY_FRAME_BYTES`.
+    stack-usage file and count as `LIBRARY_FRAME_BYTES`. A call through a pointer may lead to any
+    function of OSQP's linear solver: nothing else is called that way.
     """
     frames: dict[str, int] = {}
-    for file in folder.glob("*.su"):
+    for file in folder.rglob("*.su"):
         for line in file.read_text("utf-8").splitlines():
             place, size, kind = line.split("\t")
             if "dynamic" in kind:
@@ -134,6 +149,7 @@ LIBRARY_FRAME_BYTES = 64
 def _calls(elf: Path) -> dict[str, set[str]]:
     """Direct calls and tail calls of each function."""
     calls: dict[str, set[str]] = {}
+    through_pointer: set[str] = set()
     here = ""
     for line in _run("arm-none-eabi-objdump", "-d", "--no-show-raw-insn", str(elf)).splitlines():
         head = re.match(r"^[0-9a-f]+ <(\w+)>:$", line)
@@ -144,6 +160,10 @@ def _calls(elf: Path) -> dict[str, set[str]]:
         call = re.search(r"\t(?:bl?(?:\.[nw])?)\s+[0-9a-f]+ <(\w+)>$", line)
         if call and call[1] != here:
             calls[here].add(call[1])
+        elif re.search(r"\t(?:blx|bx)\s+(?!lr)\w+$", line):
+            through_pointer.add(here)
+    for name in through_pointer:
+        calls[name] |= {target for target in calls if target.endswith("_qdldl")}
     return calls
 
 
@@ -268,12 +288,15 @@ class Target:
         )
 
     def _read(self, size: int) -> bytes:
-        data = b""
+        data, give_up = b"", monotonic() + ANSWER_TIMEOUT_S
         while len(data) < size:
-            ready, _, _ = select.select([self._answers], [], [], ANSWER_TIMEOUT_S)
-            if not ready or self._process.poll() is not None:
-                raise CodegenError("the firmware does not answer")
-            data += os.read(self._answers, size - len(data))
+            ready, _, _ = select.select([self._answers], [], [], LOOK_EVERY_S)
+            if ready:
+                data += os.read(self._answers, size - len(data))
+            elif self._process.poll() is not None:
+                raise CodegenError(f"the firmware has stopped (exit {self._process.returncode})")
+            elif monotonic() > give_up:
+                raise CodegenError(f"the firmware does not answer within {ANSWER_TIMEOUT_S:g} s")
         return data
 
 

@@ -11,14 +11,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc import __version__
+from qpmpc.codegen.osqp_source import CONSTANT_ARRAYS, PREFIX, osqp_files, osqp_version
 from qpmpc.codegen.values import CONSTANTS, Values
 from qpmpc.errors import InputError
 from qpmpc.files import check_folder, write_text
 
 Precision = Literal["f32", "f64"]
 Target = Literal["host", "cortex-m7"]
+Solver = Literal["admm", "osqp"]
 PRECISIONS: tuple[Precision, ...] = ("f32", "f64")
 TARGETS: tuple[Target, ...] = ("host", "cortex-m7")
+SOLVERS: tuple[Solver, ...] = ("admm", "osqp")
+# Flash and RAM of the firmware: what does not fit does not link. For the solver written for this
+# problem the project's budget; OSQP takes more, see docs/embedded.md.
+MEMORY_KB: dict[tuple[Solver, Precision], tuple[int, int]] = {
+    ("admm", "f32"): (128, 96),
+    ("admm", "f64"): (128, 96),
+    ("osqp", "f32"): (256, 192),
+    ("osqp", "f64"): (256, 320),
+}
 
 Name = TypeVar("Name", bound=str)
 
@@ -31,7 +42,11 @@ _STRETCH = {
 
 
 def generate(
-    values: Values, folder: Path, target: Target = "host", precision: Precision = "f32"
+    values: Values,
+    folder: Path,
+    target: Target = "host",
+    precision: Precision = "f32",
+    solver: Solver = "admm",
 ) -> list[Path]:
     """Write the C project of a controller; same input, same bytes.
 
@@ -41,6 +56,7 @@ def generate(
     folder : of the project; files of the same names are replaced, others left alone
     target : `host` (shared library) or `cortex-m7` (bare metal, for QEMU's mps2-an500)
     precision : of all arithmetic
+    solver : `admm`, written for this problem, or `osqp`, OSQP's own embedded code
 
     Returns
     -------
@@ -49,29 +65,38 @@ def generate(
     Raises
     ------
     InputError
-        If target or precision is unknown or the folder cannot be written to.
+        If target, precision or solver is unknown or the folder cannot be written to.
     """
     check_folder(folder, "output folder")
-    files = project_files(values, target, precision)
+    files = project_files(values, target, precision, solver)
     for name, text in files.items():
         write_text(folder / name, text)
     return [folder / name for name in files]
 
 
 def project_files(
-    values: Values, target: Target = "host", precision: Precision = "f32"
+    values: Values,
+    target: Target = "host",
+    precision: Precision = "f32",
+    solver: Solver = "admm",
 ) -> dict[str, str]:
     """Return the text of every file of the project, by name.
 
     Raises
     ------
     InputError
-        If target or precision is unknown.
+        If target, precision or solver is unknown.
     """
     one_of(target, TARGETS, "target")
     one_of(precision, PRECISIONS, "precision")
+    one_of(solver, SOLVERS, "solver")
     root = resources.files("qpmpc.codegen")
     files = {p.name: p.read_text("utf-8") for p in _sorted(root / "runtime")}
+    of_osqp: dict[str, str] = {}
+    if solver == "osqp":
+        del files["mpc_admm.c"]
+        files |= {p.name: p.read_text("utf-8") for p in _sorted(root / "osqp_adapter")}
+        of_osqp = osqp_files(values, precision)
     if target == "cortex-m7":
         files |= {p.name: p.read_text("utf-8") for p in _sorted(root / "cortex_m7")}
     jinja2 = _jinja2()
@@ -82,19 +107,22 @@ def project_files(
         trim_blocks=False,
         autoescape=False,
     )
-    context = _context(values, target, precision)
-    for output, template in {
+    context = _context(values, target, precision, solver)
+    templates = {
         "mpc_config.h": "mpc_config.h.j2",
         "mpc_constants.h": "mpc_constants.h.j2",
         "mpc_data.c": "mpc_data.c.j2",
         "Makefile": f"Makefile.{target}.j2",
         "README.md": "README.md.j2",
         "NOTICE": "NOTICE.j2",
-    }.items():
-        sources = sorted(name for name in [*files, "mpc_data.c"] if name.endswith(".c"))
-        text = environment.get_template(template).render(**context, sources=dict.fromkeys(sources))
-        files[output] = text
-    return dict(sorted(files.items()))
+    }
+    if target == "cortex-m7":
+        templates["cortex_m7.ld"] = "cortex_m7.ld.j2"
+    context["sources"] = sorted(n for n in [*files, "mpc_data.c"] if n.endswith(".c"))
+    context["osqp_sources"] = [name for name in of_osqp if name.endswith(".c")]
+    for output, template in templates.items():
+        files[output] = environment.get_template(template).render(context)
+    return dict(sorted((files | of_osqp).items()))
 
 
 def one_of(name: str, names: tuple[Name, ...], what: str) -> Name:
@@ -128,7 +156,9 @@ def _count_or(literal: Callable[[float], str], value: float) -> str:
     return str(value) if isinstance(value, int) else literal(value)
 
 
-def _context(values: Values, target: Target, precision: Precision) -> dict[str, Any]:
+def _context(
+    values: Values, target: Target, precision: Precision, solver: Solver
+) -> dict[str, Any]:
     def literal(number: float) -> str:
         if precision == "f32":
             return f"{np.float32(number)!s}f"
@@ -147,6 +177,10 @@ def _context(values: Values, target: Target, precision: Precision) -> dict[str, 
         "version": __version__,
         "target": target,
         "precision": precision,
+        "solver": solver,
+        "osqp_version": osqp_version(),
+        "constant_arrays": [f"{PREFIX}{name}" for name in CONSTANT_ARRAYS],
+        "memory_kb": MEMORY_KB[solver, precision],
         "values": values,
         "sizes": values.sizes,
         "constants": [

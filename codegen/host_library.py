@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from qpmpc.codegen.generate import Precision, project_files
+from qpmpc.codegen.generate import Precision, Solver, project_files
 from qpmpc.codegen.values import Values
 from qpmpc.errors import QpmpcError
 from qpmpc.files import write_text
@@ -32,6 +32,11 @@ _ABI_NAMES = (
     "offset of engine_on",
 )
 VARS = 7
+# -w: a warning that a new compiler invents must not stop a user; the tests see to warnings
+FLAGS = (
+    "-O3 -std=c99 -w -ffp-contract=off -fPIC -shared -Wl,-Bsymbolic "
+    "-Iosqp -Iosqp/inc/public -Iosqp/inc/private"
+)
 _STATE = 4
 
 
@@ -121,7 +126,9 @@ class HostLibrary:
         self.plan = self._library.mpc_plan
 
 
-def build_host_library(values: Values, precision: Precision = "f64") -> HostLibrary:
+def build_host_library(
+    values: Values, precision: Precision = "f64", solver: Solver = "admm"
+) -> HostLibrary:
     """Generate, compile and load a controller.
 
     Raises
@@ -129,7 +136,8 @@ def build_host_library(values: Values, precision: Precision = "f64") -> HostLibr
     CodegenError
         If there is no compiler, or it fails.
     """
-    return HostLibrary(compiled(project_files(values, "host", precision)), values, precision)
+    files = project_files(values, "host", precision, solver)
+    return HostLibrary(compiled(files), values, precision)
 
 
 def compiled(files: Mapping[str, str]) -> Path:
@@ -143,7 +151,7 @@ def compiled(files: Mapping[str, str]) -> Path:
     command = compiler()
     if command is None:
         raise CodegenError("no C compiler found (tried $CC, cc, gcc, clang)")
-    digest = hashlib.sha256(command.encode())
+    digest = hashlib.sha256(f"{command} {FLAGS}".encode())
     for name, text in files.items():
         digest.update(f"{name}\0{text}\0".encode())
     kept = _cache_folder() / f"{digest.hexdigest()[:24]}.so"
@@ -171,10 +179,9 @@ def _build(files: Mapping[str, str], command: str, kept: Path) -> None:
         folder = Path(scratch)
         for name, text in files.items():
             write_text(folder / name, text)
-        flags = "-O3 -std=c99 -Wall -Wextra -Wconversion -Werror -ffp-contract=off -fPIC -shared"
-        sources = sorted(file.name for file in folder.glob("*.c"))
+        sources = sorted(name for name in files if name.endswith(".c"))
         result = subprocess.run(
-            [command, *flags.split(), "-o", "libmpc.so", *sources, "-lm"],
+            [command, *FLAGS.split(), "-o", "libmpc.so", *sources, "-lm"],
             cwd=folder,
             capture_output=True,
             text=True,

@@ -17,7 +17,7 @@ from qpmpc.codegen.firmware import (
     build_firmware,
     footprint,
 )
-from qpmpc.codegen.generate import Precision
+from qpmpc.codegen.generate import Precision, Solver
 from qpmpc.codegen.values import values_of
 from qpmpc.controllers.base import Decision, Observation
 from qpmpc.controllers.factory import ControllerSettings
@@ -54,6 +54,7 @@ class PilResult:
     """
 
     target: str
+    solver: Solver
     precision: Precision
     iterations: int
     run: Run
@@ -95,6 +96,7 @@ class PilResult:
         return {
             "cycle": self.run.cycle,
             "target": self.target,
+            "solver": self.solver,
             "precision": self.precision,
             "iterations": self.iterations,
             "steps": len(counts),
@@ -174,6 +176,7 @@ def processor_in_the_loop(
     settings: ControllerSettings | None = None,
     precision: Precision = "f32",
     progress: Progress | None = None,
+    solver: Solver = "admm",
 ) -> PilResult:
     """Drive a cycle with the firmware in QEMU (mps2-an500, Cortex-M7) on the Python plant.
 
@@ -183,6 +186,7 @@ def processor_in_the_loop(
     settings : of the controllers
     precision : of the firmware
     progress : called as progress(steps done, steps in all)
+    solver : of the firmware
 
     Raises
     ------
@@ -199,9 +203,9 @@ def processor_in_the_loop(
     twin = MhQp("mh-qp", plant, truth, truth, of_mpc, settings.rule_based)
     with TemporaryDirectory(prefix="qpmpc-pil-") as scratch:
         folder = Path(scratch)
-        elf = build_firmware(values, precision, folder)
+        elf = build_firmware(values, precision, folder, solver)
         with Target(elf, values, precision, folder) as target:
-            label = f"generated {precision} on cortex-m7"
+            label = f"generated {solver} {precision} on cortex-m7"
             firmware = _OnTarget(target, InputBuilder(preview, truth), twin, label)
             target.init()
             departure = _depart(target, firmware, vehicle, truth) if of_mpc.prepared else []
@@ -212,6 +216,7 @@ def processor_in_the_loop(
     reference = simulate(cycle, "mh-qp", vehicle, settings=settings)
     return PilResult(
         target="cortex-m7",
+        solver=solver,
         precision=precision,
         iterations=values.iterations,
         run=run,

@@ -19,7 +19,8 @@ def pil_lines(result: PilResult) -> list[str]:
     counts, departure = data["instructions"], data["departure"]
     lines = [
         f"{data['cycle']}: {data['steps']} steps on {data['target']}, {data['precision']}, "
-        f"{data['iterations']} iterations a step, {data['steps_per_s']:.0f} steps/s here",
+        f"solver {data['solver']}, {data['iterations']} iterations a step, "
+        f"{data['steps_per_s']:.0f} steps/s here",
         f"instructions a step  {counts['median']:,} median, {counts['min']:,}..{counts['max']:,} "
         f"(spread {counts['spread_percent']:.3f} %)",
     ]
@@ -55,7 +56,8 @@ def pil_lines(result: PilResult) -> list[str]:
 
 def write_pil(result: PilResult, folder: Path) -> list[str]:
     """Write steps, figures and, with matplotlib, the picture; returns remarks."""
-    stem = f"pil_{result.run.cycle}_{result.precision}"
+    solver = "" if result.solver == "admm" else f"_{result.solver}"
+    stem = f"pil_{result.run.cycle}_{result.precision}{solver}"
     write_text(folder / f"{stem}.csv", _csv(result))
     write_text(folder / f"{stem}.json", json_text(result.summary()))
     if find_spec("matplotlib") is None:
@@ -118,7 +120,8 @@ def draw_pil(result: PilResult) -> bytes:
     for axes in (counts, power, error):
         tidy(axes)
     figure.suptitle(
-        f"{result.run.cycle}: controller on {result.target} in QEMU, {result.precision}",
+        f"{result.run.cycle}: controller on {result.target} in QEMU, {result.precision}, "
+        f"solver {result.solver}",
         fontsize=11,
     )
     return png(figure)

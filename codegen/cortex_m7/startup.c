@@ -19,6 +19,15 @@ void fault_handler(void);
 #define FPU_ACCESS (*(volatile uint32_t *)0xE000ED88u)
 #define FPU_FULL_ACCESS 0x00F00000u
 
+/* Memory protection unit: flash of the emulated board is memory like any other; this makes writing
+ * to it the fault that it would be elsewhere. */
+#define MPU_CONTROL (*(volatile uint32_t *)0xE000ED94u)
+#define MPU_REGION (*(volatile uint32_t *)0xE000ED98u)
+#define MPU_BASE (*(volatile uint32_t *)0xE000ED9Cu)
+#define MPU_SIZE (*(volatile uint32_t *)0xE000EDA0u)
+#define MPU_ENABLE_WITH_DEFAULT_MAP 5u
+#define MPU_READ_ONLY_4_MB ((6u << 24) | (21u << 1) | 1u)
+
 typedef void (*vector)(void);
 
 __attribute__((section(".vectors"), used)) static const vector vectors[16] = {
@@ -41,6 +50,11 @@ __attribute__((noreturn)) void reset_handler(void)
     for (uint32_t *to = link_bss_start; to < link_bss_end; to++) {
         *to = 0u;
     }
+    MPU_REGION = 0u;
+    MPU_BASE = 0u;
+    MPU_SIZE = MPU_READ_ONLY_4_MB;
+    MPU_CONTROL = MPU_ENABLE_WITH_DEFAULT_MAP;
+    __asm volatile("dsb\n isb" ::: "memory");
     board_paint_stack();
     board_exit(main());
 }

@@ -18,8 +18,6 @@ enum {
     VAR_T_CL = 6,     /* degC, at the end of the stage */
     MPC_VARS = 7
 };
-#define COUPLED 2    /* first variable that elimination of the stage before touches */
-#define COUPLED_COUNT 5
 
 /* Rows of a stage. */
 enum {
@@ -63,6 +61,12 @@ typedef struct {
     real_t t_max_high;
 } stage_bounds;
 
+#if !MPC_SOLVER_OSQP
+enum {
+    COUPLED = 2, /* first variable that elimination of the stage before touches */
+    COUPLED_COUNT = 5
+};
+
 /* Factor of a stage: L D L' with unit L, of which only what can differ from 0 is kept. */
 typedef struct {
     real_t slack_t;                             /* column of slack: t_cl */
@@ -72,6 +76,7 @@ typedef struct {
     real_t before_t[COUPLED_COUNT];             /* column of t_cl before */
     real_t inverse_d[MPC_VARS];
 } stage_factor;
+#endif
 
 typedef struct {
     real_t duration_s; /* 0: masked, the stage passes the state on and costs nothing */
@@ -86,12 +91,14 @@ typedef struct {
     real_t q[MPC_VARS];
     real_t column[MPC_VARS]; /* SI value = column * solver value */
     real_t row[MPC_ROWS];
-    stage_factor factor;
     real_t x[MPC_VARS]; /* in SI units between steps, in solver units while solving; SOC and
                            coolant temperature from the origin */
-    real_t z[MPC_ROWS];
     real_t y[MPC_ROWS];
+#if !MPC_SOLVER_OSQP
+    real_t z[MPC_ROWS];
     real_t work[MPC_VARS];
+    stage_factor factor;
+#endif
 } mpc_stage;
 
 /* The iterate that a solve starts from, in SI units. */

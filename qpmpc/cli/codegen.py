@@ -17,6 +17,14 @@ def codegen(
         typer.Option(metavar="TARGET", help="host (shared library) or cortex-m7 (firmware)."),
     ] = "host",
     precision: Annotated[str, typer.Option(metavar="f32|f64", help="Of all arithmetic.")] = "f32",
+    solver: Annotated[
+        str,
+        typer.Option(
+            metavar="admm|osqp",
+            help="Written for this problem, or OSQP's own generated code: one instance, more "
+            "memory and time.",
+        ),
+    ] = "admm",
     iterations: Annotated[
         int | None,
         typer.Option(
@@ -33,23 +41,26 @@ def codegen(
       qpmpc codegen controller_c
 
       qpmpc codegen firmware --target cortex-m7 --precision f32 --iterations 25
+
+      qpmpc codegen with_osqp --solver osqp --precision f64
     """
     from qpmpc.cli.console import result_console
     from qpmpc.cli.inputs import load_vehicle_and_settings
-    from qpmpc.codegen.generate import PRECISIONS, TARGETS, generate, one_of
+    from qpmpc.codegen.generate import PRECISIONS, SOLVERS, TARGETS, generate, one_of
     from qpmpc.codegen.values import values_of
 
     of_target = one_of(target, TARGETS, "target")
     of_precision = one_of(precision, PRECISIONS, "precision")
+    of_solver = one_of(solver, SOLVERS, "solver")
     overrides = list(set_ or [])
     if iterations is not None:
         overrides.append(f"mh_qp.osqp.iterations={iterations}")
     car, settings = load_vehicle_and_settings(vehicle, overrides)
     values = values_of(car, settings.mh_qp, settings.rule_based)
-    files = generate(values, folder, of_target, of_precision)
+    files = generate(values, folder, of_target, of_precision, of_solver)
     sizes = values.sizes
     result_console().print(
-        f"{folder}: {len(files)} files written, target {target}, {precision}, {sizes.stages} "
-        f"stages, {values.iterations} iterations a step; start with README.md",
+        f"{folder}: {len(files)} files written, target {target}, {precision}, solver {solver}, "
+        f"{sizes.stages} stages, {values.iterations} iterations a step; start with README.md",
         markup=False,
     )
