@@ -1,13 +1,13 @@
 """Generator: the C project of one controller, from templates and the runtime's own files."""
 
 from collections.abc import Callable
-from importlib import import_module, resources
+from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from types import ModuleType
 from typing import Any, Literal, TypeVar
 
 import numpy as np
+from jinja2 import Environment, FunctionLoader, StrictUndefined
 from numpy.typing import NDArray
 
 from qpmpc import __version__
@@ -99,10 +99,9 @@ def project_files(
         of_osqp = osqp_files(values, precision)
     if target == "cortex-m7":
         files |= {p.name: p.read_text("utf-8") for p in _sorted(root / "cortex_m7")}
-    jinja2 = _jinja2()
-    environment = jinja2.Environment(
-        loader=jinja2.FunctionLoader(lambda name: (root / "templates" / name).read_text("utf-8")),
-        undefined=jinja2.StrictUndefined,
+    environment = Environment(
+        loader=FunctionLoader(lambda name: (root / "templates" / name).read_text("utf-8")),
+        undefined=StrictUndefined,
         keep_trailing_newline=True,
         trim_blocks=False,
         autoescape=False,
@@ -137,15 +136,6 @@ def one_of(name: str, names: tuple[Name, ...], what: str) -> Name:
         if name == known:
             return known
     raise InputError(f"unknown {what} {name!r}: use one of {', '.join(names)}")
-
-
-def _jinja2() -> ModuleType:
-    try:
-        return import_module("jinja2")
-    except ImportError as error:
-        raise InputError(
-            "generating code needs jinja2, which is not installed: pip install 'qpmpc-iptm[plot]'"
-        ) from error
 
 
 def _sorted(folder: Traversable) -> list[Traversable]:

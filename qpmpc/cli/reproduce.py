@@ -43,10 +43,9 @@ def reproduce(
     car, settings = load_vehicle_and_settings(vehicle, set_)
     check_outputs(json_file, out)
     check_names(["dp"])
-    missing = [name for name in ("matplotlib", "jinja2") if find_spec(name) is None]
-    if missing:
+    if find_spec("matplotlib") is None:
         raise InputError(
-            f"reproduce needs {', '.join(missing)}: pip install 'qpmpc-iptm[plot,verification]'"
+            "reproduce needs matplotlib: pip install 'qpmpc-iptm[plot,verification]'"
         )
     from qpmpc.verification.reproduce.report import study_data, write_report
 

@@ -7,7 +7,7 @@ import typer
 
 from qpmpc.cli.options import JsonOption, OutOption
 
-NEEDED = ("clarabel", "daqp", "jinja2", "numba", "piqp", "qoco")
+NEEDED = ("clarabel", "daqp", "numba", "piqp", "qoco")
 
 
 def verify(

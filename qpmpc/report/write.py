@@ -48,7 +48,7 @@ def write_comparison(
     for run in runs:
         write_text(folder / f"{run.cycle}_{run.controller}.csv", trajectory_csv(run))
     write_text(folder / "compare.json", json_text({"runs": list(rows)}))
-    missing = _missing("matplotlib", "jinja2")
+    missing = _missing("matplotlib")
     if missing:
         return [
             f"{folder}: trajectories (CSV) and compare.json written; no pictures and no report: "
