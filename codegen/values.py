@@ -11,7 +11,8 @@ from qpmpc.controllers.planner import DEPARTURE_LINEARISATIONS, WARM_UP_STEPS
 from qpmpc.controllers.rule_based import RuleBasedSettings
 from qpmpc.errors import InputError
 from qpmpc.pwa.model import PwaModel
-from qpmpc.qp import stage_qp
+from qpmpc.qp import linearisation, stage_qp
+from qpmpc.qp.coolant import radiator_w_per_k
 from qpmpc.qp.stage_qp import T_CL_MAX_MARGIN_K
 from qpmpc.solvers import base
 from qpmpc.vehicle.battery import BatteryMaps
@@ -25,10 +26,13 @@ EQUALITY_WIDTH = 1e-4  # solver units
 CONSTANTS: dict[str, dict[str, float]] = {
     mh_qp.__name__: {"ON_THRESHOLD": mh_qp.ON_THRESHOLD},
     planner.__name__: {
-        "COLDEST_DEGC": planner.COLDEST_DEGC,
-        "HOTTEST_DEGC": planner.HOTTEST_DEGC,
-        "DEPARTURE_FUEL_G_PER_S": planner.DEPARTURE_FUEL_G_PER_S,
         "FAILURES_FORGIVEN": planner.FAILURES_FORGIVEN,
+    },
+    linearisation.__name__: {
+        "COLDEST_DEGC": linearisation.COLDEST_DEGC,
+        "HOTTEST_DEGC": linearisation.HOTTEST_DEGC,
+        "DEPARTURE_FUEL_G_PER_S": linearisation.DEPARTURE_FUEL_G_PER_S,
+        "DEPARTURE_P_ENG_W": linearisation.DEPARTURE_P_ENG_W,
     },
     safety.__name__: {
         "SOC_MARGIN": safety.SOC_MARGIN,
@@ -39,7 +43,6 @@ CONSTANTS: dict[str, dict[str, float]] = {
     },
     stage_qp.__name__: {
         "SHORTEST_SCALE_S": stage_qp.SHORTEST_SCALE_S,
-        "ROW_GAP_K": stage_qp.ROW_GAP,
         "REACH_MARGIN_SOC": stage_qp.REACH_MARGIN_SOC,
         "ACCURATE_STAGE_S": stage_qp.ACCURATE_STAGE_S,
         "SIGMA_FORCED": stage_qp.SIGMA_FORCED,
@@ -201,6 +204,7 @@ def _plant(vehicle: Vehicle, line: OptimalLine, maps: BatteryMaps) -> dict[str, 
         "cold_span_k": cold.span_k,
         "cold_exponent": cold.exponent,
         **{name: float(value) for name, value in thermal.items()},
+        "thermostat_w_per_k": radiator_w_per_k(vehicle.thermal),
         "charge_c": maps.charge_c,
         "battery_discharge_max_w": battery.power_discharge_max_w,
         "battery_charge_max_w": battery.power_charge_max_w,

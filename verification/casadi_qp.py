@@ -8,17 +8,16 @@ from numpy.typing import NDArray
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.fit import PwaFit
 from qpmpc.pwa.model import PwaModel
+from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.stage_qp import (
     ACCURATE_STAGE_S,
     REACH_MARGIN_SOC,
-    ROW_GAP,
     SIGMA_FORCED,
     T_CL_MAX_MARGIN_K,
-    Linearisation,
     QpSettings,
 )
 from qpmpc.qp.structure import VARS, Var
-from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.vehicle.parameters import Thermal, Vehicle
 from qpmpc.verification.matrices import Matrices
 from qpmpc.verification.nlp_maps import casadi
 
@@ -47,7 +46,7 @@ class CasadiQp:
         x = ca.SX.sym("x", VARS, stages)
         state = ca.SX.sym("state", 2)
         road = ca.SX.sym("road", 4, stages)  # h, P0, v, l
-        about = ca.SX.sym("about", 2, stages)  # T^, F^
+        about = ca.SX.sym("about", 5, stages)  # T^, F^, E^, T at start and end
         piece = ca.SX.sym("piece", 2, stages)  # slope and intercept of alpha
         smoothing = ca.SX.sym("smoothing", VARS, stages)
         cost, zero, positive = self._program(x, state, road, about, piece)
@@ -89,7 +88,15 @@ class CasadiQp:
         q, p, equal, equal_at, upper, upper_at = self._matrices(
             [soc, t_cl_degc],
             road,
-            np.stack([t_cl, about.fuel_g_per_s]),
+            np.stack(
+                [
+                    t_cl,
+                    about.fuel_g_per_s,
+                    about.p_eng_w,
+                    about.t_cl_start_degc,
+                    about.t_cl_end_degc,
+                ]
+            ),
             np.stack([alpha.slope[active], alpha.intercept[active]]),
             weights.T,
         )
@@ -142,15 +149,18 @@ class CasadiQp:
             fade = (about[0, k] - th.cabin_heat_from_degc) / (
                 th.cabin_heat_full_degc - th.cabin_heat_from_degc
             )
-            heat = (1.0 - th.exhaust_share) * (lhv_j_per_g * burnt - power)
-            heat -= ua * (mean - th.t_amb_degc)
-            heat -= th.cabin_heat_w * ca.fmin(ca.fmax(fade, 0.0), 1.0)
-            wasted = t_before - t_cl + h * heat / th.heat_capacity_j_per_k
-            radiator = th.radiator_w_per_k * (th.t_cl_max_degc - th.t_amb_degc)
-            most_wasted = ca.fmax(h * radiator / th.heat_capacity_j_per_k, ROW_GAP)
+            cabin = th.cabin_heat_w * ca.fmin(ca.fmax(fade, 0.0), 1.0)
+
+            def heat(burnt: Any, power: Any, mean: Any, ua: Any = ua, cabin: Any = cabin) -> Any:
+                gained = (1.0 - th.exhaust_share) * (lhv_j_per_g * burnt - power)
+                return gained - ua * (mean - th.t_amb_degc) - cabin
+
+            mean_at = 0.5 * (about[3, k] + about[4, k])
+            burnt_at = _expanded(mean_at, about[1, k], about[0, k], about[1, k], piece[:, k])
+            heat_at = heat(burnt_at, about[2, k], mean_at)
+            after = _thermostat(th, h, (heat(burnt, power, mean), t_before), (heat_at, about[3, k]))
+            zero.append(t_cl - after)
             positive += [
-                wasted,
-                most_wasted - wasted,
                 t_cl + slack - th.t_cl_min_degc - settings.t_cl_margin_k,
                 th.t_cl_max_degc - T_CL_MAX_MARGIN_K - t_cl + slack,
                 slack,
@@ -193,3 +203,32 @@ def _expanded(t_cl: Any, fuel: Any, t_at: Any, fuel_at: Any, piece: Any) -> Any:
     value = ca.substitute(product, both, here)
     slopes = ca.substitute(ca.gradient(product, both), both, here)
     return value + ca.dot(slopes, ca.vertcat(t_cl, fuel) - here)
+
+
+def _thermostat(th: Thermal, h: Any, now: tuple[Any, Any], at: tuple[Any, Any]) -> Any:
+    """Coolant at the end of a stage to first order about (heat, T at start), by differentiation.
+
+    C dT/dt = heat - radiator, the radiator opening linearly over the thermostat's span.
+    """
+    ca = casadi()
+    full_w = th.radiator_w_per_k * (th.t_cl_max_degc - th.t_amb_degc)
+    slope, capacity = full_w / th.thermostat_span_k, th.heat_capacity_j_per_k
+    both = ca.SX.sym("both", 2)
+    heat, u = both[0], both[1] - th.thermostat_open_degc
+
+    def shut(u: Any, span: Any) -> Any:
+        return u + heat * span / capacity
+
+    def open_(u: Any, span: Any) -> Any:
+        return heat / slope + (u - heat / slope) * ca.exp(-span * slope / capacity)
+
+    opens_at = -u * capacity / ca.if_else(heat > 0.0, heat, 1.0)
+    falling = ca.if_else(heat < 0.0, heat, -1.0) / slope
+    closes_at = capacity / slope * ca.log((ca.fmax(u, 0.0) - falling) / -falling)
+    from_shut = ca.if_else(shut(u, h) > 0.0, open_(0.0, h - opens_at), shut(u, h))
+    from_open = ca.if_else(open_(u, h) < 0.0, shut(0.0, h - closes_at), open_(u, h))
+    end = ca.if_else(u < 0.0, from_shut, from_open) + th.thermostat_open_degc
+    here, there = ca.vertcat(*now), ca.vertcat(*at)
+    value = ca.substitute(end, both, there)
+    slopes = ca.substitute(ca.gradient(end, both), both, there)
+    return value + ca.dot(slopes, here - there)

@@ -3,6 +3,8 @@
 The checks compare the product with these; nothing here calls the product's own maps.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -115,6 +117,33 @@ class Equations:
         fades = [th.cabin_heat_from_degc, th.cabin_heat_full_degc]
         t = np.asarray(t_cl_degc, dtype=float)
         return np.asarray(np.interp(t, fades, [0.0, th.cabin_heat_w]))
+
+    def coolant_after_degc(self, duration_s: float, t_cl_degc: float, heat_w: float) -> float:
+        """T after a stage of constant heat, the thermostat opening or closing on the way.
+
+        The radiator's heat grows linearly from nothing at T_open to its full power at T_max; the
+        two linear regimes are driven through one after the other.
+        """
+        th = self.vehicle.thermal
+        capacity = th.heat_capacity_j_per_k
+        full_w = th.radiator_w_per_k * (th.t_cl_max_degc - th.t_amb_degc)
+        tau = capacity * th.thermostat_span_k / full_w
+        rest = th.thermostat_open_degc + heat_w * tau / capacity  # where the open one settles
+        left, t = duration_s, t_cl_degc
+        while left > 0.0:
+            is_open = t > th.thermostat_open_degc or (t == th.thermostat_open_degc and heat_w > 0.0)
+            if is_open:
+                t_next = rest + (t - rest) * math.exp(-left / tau)
+                if t_next >= th.thermostat_open_degc:
+                    return t_next
+                left -= tau * math.log((t - rest) / (th.thermostat_open_degc - rest))
+            else:
+                t_next = t + heat_w * left / capacity
+                if t_next <= th.thermostat_open_degc:
+                    return t_next
+                left -= (th.thermostat_open_degc - t) * capacity / heat_w
+            t = th.thermostat_open_degc
+        return t
 
     def radiator_w(self, t_cl_degc: ArrayLike) -> Floats:
         """Heat to the radiator."""

@@ -15,7 +15,8 @@ from qpmpc.preview.forecast import Trace
 from qpmpc.preview.stages import StageBuilder, Stages
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.cvxpy_twin import CvxpyTwin
-from qpmpc.qp.stage_qp import Linearisation, QpData, StageQp
+from qpmpc.qp.linearisation import Linearisation
+from qpmpc.qp.stage_qp import QpData, StageQp
 from qpmpc.qp.structure import VARS, Var
 from qpmpc.simulate import simulate
 from qpmpc.solvers.base import Status
@@ -34,6 +35,8 @@ CVXPY_OPTIONS = {"eps_abs": 1e-9, "eps_rel": 1e-9}  # of PIQP, in cvxpy's units:
 DAQP_OPTIONS = {"primal_tol": 1e-9, "dual_tol": 1e-9, "iter_limit": 10_000}
 PROXIMAL_WEIGHTS = (1e-4, 1e-3, 1e-2)  # the next where DAQP cycles with one; same optimum
 EQUALITY = 5  # DAQP's name for it
+# T^, F^, E^, T at start and end of a random case
+RANDOM_ABOUT = ((20.0, 90.0), (0.0, 3.0), (0.0, 40e3), (20.0, 90.0), (20.0, 90.0))
 
 
 @dataclass(frozen=True)
@@ -183,9 +186,7 @@ def recorded_cases(
         soc, t_cl_degc = float(run.soc[step]), float(run.t_cl_degc[step])
         x = again.planner.solve(step, soc, t_cl_degc).x
         if step % every == 0:
-            ends = x[:, Var.T_CL]
-            means = 0.5 * (ends + np.concatenate([[t_cl_degc], ends[:-1]]))
-            about = Linearisation(means, np.maximum(x[:, Var.FUEL], 0.0))
+            about = Linearisation.about(x, t_cl_degc, preview.settings)
             yield QpCase(preview.at(step), soc, t_cl_degc, about)
 
 
@@ -201,7 +202,7 @@ def random_cases(
             soc=float(rng.uniform(battery.soc_min, battery.soc_max)),
             t_cl_degc=float(rng.uniform(20.0, 90.0)),
             about=Linearisation(
-                rng.uniform(20.0, 90.0, preview.count), rng.uniform(0.0, 3.0, preview.count)
+                *(rng.uniform(low, high, preview.count) for low, high in RANDOM_ABOUT)
             ),
         )
 

@@ -65,7 +65,7 @@ def relaxed_trip(cycle: Cycle, vehicle: Vehicle) -> RelaxedTrip:
     )
     qp = StageQp(vehicle, under, preview.count, SETTINGS, ScalingSettings())
     stages, start = preview.at(0), vehicle.trip.t_cl_init_degc
-    about = Linearisation(np.full(preview.count, start), np.full(preview.count, 0.3))
+    about = Linearisation.constant(preview.count, start)
     solver = make_solver("piqp", 1e-7)
     fuel_g = np.inf
     for done in range(MOST_ROUNDS):
@@ -83,5 +83,5 @@ def relaxed_trip(cycle: Cycle, vehicle: Vehicle) -> RelaxedTrip:
             on = x[:, Var.ON]
             integral = float(np.mean((on < INTEGRAL) | (on > 1.0 - INTEGRAL)))
             return RelaxedTrip(fuel_g, integral, done + 1)
-        about = Linearisation(mean, np.maximum(x[:, Var.FUEL], 0.0))
+        about = Linearisation.about(x, start, layout)
     raise QpmpcError(f"relaxed trip {cycle.name}: no convergence in {MOST_ROUNDS} linearisations")

@@ -155,7 +155,7 @@ static OSQPInt load_vectors(const mpc_state *state)
             values[(k * MPC_VARS) + i] = state->stage[k].q[i];
         }
         put_bounds(first + ROW_SOC, REAL(0.0), REAL(0.0));
-        put_bounds(first + ROW_T_CL, b->t_cl_low, b->t_cl_high);
+        put_bounds(first + ROW_T_CL, b->t_cl, b->t_cl);
         for (int32_t i = 0; i < MPC_FUEL_PIECES; i++) {
             put_bounds(first + ROW_FUEL + i, REAL(0.0), UNLIMITED);
         }

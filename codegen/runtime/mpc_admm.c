@@ -71,10 +71,9 @@ static void assemble(const mpc_stage *stage, stage_normal *m)
     const real_t rho = mpc_par.rho;
     real_t on_on = REAL(1.0) + (a->p_max[1] * a->p_max[1]) + (a->p_min[1] * a->p_min[1]);
     real_t on_e = (a->p_max[0] * a->p_max[1]) + (a->p_min[0] * a->p_min[1]);
-    real_t e_e = (a->t_cl[2] * a->t_cl[2]) + (a->p_max[0] * a->p_max[0])
-                 + (a->p_min[0] * a->p_min[0]);
-    real_t f_f = a->t_cl[3] * a->t_cl[3];
-    real_t f_e = a->t_cl[3] * a->t_cl[2];
+    real_t e_e = (a->p_max[0] * a->p_max[0]) + (a->p_min[0] * a->p_min[0]);
+    real_t f_f = REAL(0.0);
+    real_t f_e = REAL(0.0);
     real_t on_f = REAL(0.0);
     real_t on_g = REAL(0.0);
     real_t g_g = REAL(0.0);
@@ -109,23 +108,25 @@ static void assemble(const mpc_stage *stage, stage_normal *m)
     m->dense[IN_INTERNAL][IN_INTERNAL] = p[VAR_INTERNAL] + mpc_par.sigma + (rho * g_g)
                                          + (strong * a->soc[2] * a->soc[2]);
     m->dense[IN_FUEL][IN_INTERNAL] = REAL(0.0);
-    m->dense[IN_FUEL][IN_FUEL] = p[VAR_FUEL] + mpc_par.sigma + (rho * f_f);
+    m->dense[IN_FUEL][IN_FUEL] = p[VAR_FUEL] + mpc_par.sigma + (rho * f_f)
+                                 + (strong * a->t_cl[3] * a->t_cl[3]);
     m->dense[IN_P_ENG][IN_INTERNAL] = rho * g_e;
-    m->dense[IN_P_ENG][IN_FUEL] = rho * f_e;
-    m->dense[IN_P_ENG][IN_P_ENG] = p[VAR_P_ENG] + mpc_par.sigma + (rho * e_e);
+    m->dense[IN_P_ENG][IN_FUEL] = (rho * f_e) + (strong * a->t_cl[3] * a->t_cl[2]);
+    m->dense[IN_P_ENG][IN_P_ENG] = p[VAR_P_ENG] + mpc_par.sigma + (rho * e_e)
+                                   + (strong * a->t_cl[2] * a->t_cl[2]);
     m->dense[IN_SOC][IN_INTERNAL] = strong * a->soc[2] * a->soc[0];
     m->dense[IN_SOC][IN_FUEL] = REAL(0.0);
     m->dense[IN_SOC][IN_P_ENG] = REAL(0.0);
     m->dense[IN_SOC][IN_SOC] =
         p[VAR_SOC] + mpc_par.sigma + rho + (strong * a->soc[0] * a->soc[0]);
     m->dense[IN_T_CL][IN_INTERNAL] = REAL(0.0);
-    m->dense[IN_T_CL][IN_FUEL] = rho * a->t_cl[3] * a->t_cl[0];
-    m->dense[IN_T_CL][IN_P_ENG] = rho * a->t_cl[2] * a->t_cl[0];
+    m->dense[IN_T_CL][IN_FUEL] = strong * a->t_cl[3] * a->t_cl[0];
+    m->dense[IN_T_CL][IN_P_ENG] = strong * a->t_cl[2] * a->t_cl[0];
     m->dense[IN_T_CL][IN_SOC] = REAL(0.0);
     m->dense[IN_T_CL][IN_T_CL] =
         p[VAR_T_CL] + mpc_par.sigma
-        + (rho * ((a->t_cl[0] * a->t_cl[0]) + (a->t_min[0] * a->t_min[0])
-                  + (a->t_max[0] * a->t_max[0])));
+        + (rho * ((a->t_min[0] * a->t_min[0]) + (a->t_max[0] * a->t_max[0])))
+        + (strong * a->t_cl[0] * a->t_cl[0]);
 }
 
 /* Eliminate SOC and T_cl of the stage before from this one. */
@@ -133,12 +134,12 @@ static void eliminate_before(mpc_stage *stage, const stage_factor *before, stage
 {
     const stage_matrix *const a = &stage->a;
     const real_t strong = mpc_par.rho_equality * a->soc[1];
-    const real_t weak = mpc_par.rho * a->t_cl[1];
+    const real_t heat = mpc_par.rho_equality * a->t_cl[1];
     const real_t t_soc = before->dense[IN_T_CL][IN_SOC];
     const real_t raw_soc[2] = {strong * a->soc[2], strong * a->soc[0]}; /* internal, soc */
-    const real_t raw_t[COUPLED_COUNT] = {-raw_soc[0] * t_soc, weak * a->t_cl[3],
-                                         weak * a->t_cl[2], -raw_soc[1] * t_soc,
-                                         weak * a->t_cl[0]};
+    const real_t raw_t[COUPLED_COUNT] = {-raw_soc[0] * t_soc, heat * a->t_cl[3],
+                                         heat * a->t_cl[2], -raw_soc[1] * t_soc,
+                                         heat * a->t_cl[0]};
     stage_factor *const f = &stage->factor;
     f->before_soc[0] = raw_soc[0] * before->inverse_d[VAR_SOC];
     f->before_soc[1] = raw_soc[1] * before->inverse_d[VAR_SOC];
@@ -193,7 +194,7 @@ void solver_start(mpc_state *state)
         if (k < (MPC_STAGES - 1)) {
             const stage_matrix *const next = &state->stage[k + 1].a;
             m.dense[IN_SOC][IN_SOC] += mpc_par.rho_equality * next->soc[1] * next->soc[1];
-            m.dense[IN_T_CL][IN_T_CL] += mpc_par.rho * next->t_cl[1] * next->t_cl[1];
+            m.dense[IN_T_CL][IN_T_CL] += mpc_par.rho_equality * next->t_cl[1] * next->t_cl[1];
         }
         if (k > 0) {
             eliminate_before(stage, &state->stage[k - 1].factor, &m);
@@ -210,7 +211,7 @@ static void right_hand_side(mpc_stage *stage, real_t *work_before)
     const real_t *const z = stage->z;
     const real_t *const y = stage->y;
     const real_t soc = (mpc_par.rho_equality * z[ROW_SOC]) - y[ROW_SOC];
-    const real_t t_cl = (rho * z[ROW_T_CL]) - y[ROW_T_CL];
+    const real_t t_cl = (mpc_par.rho_equality * z[ROW_T_CL]) - y[ROW_T_CL];
     const real_t p_max = (rho * z[ROW_P_MAX]) - y[ROW_P_MAX];
     const real_t p_min = (rho * z[ROW_P_MIN]) - y[ROW_P_MIN];
     const real_t t_min = (rho * z[ROW_T_MIN]) - y[ROW_T_MIN];
@@ -306,13 +307,13 @@ static inline void project(real_t product, real_t low, real_t high, real_t *z, r
     *z = inside;
 }
 
-/* The same for an equality with 0. */
-static inline void project_onto_zero(real_t product, real_t *z, real_t *y)
+/* The same for an equality. */
+static inline void project_onto(real_t product, real_t value, real_t *z, real_t *y)
 {
     const real_t relaxed =
         (mpc_par.relaxation * product) + ((REAL(1.0) - mpc_par.relaxation) * *z);
-    *y += mpc_par.rho_equality * relaxed;
-    *z = REAL(0.0);
+    *y += mpc_par.rho_equality * (relaxed - value);
+    *z = value;
 }
 
 /* The second and third line of the iteration for one stage. */
@@ -327,8 +328,8 @@ static void update(mpc_stage *stage, const real_t *before)
         stage->x[i] = (mpc_par.relaxation * stage->work[i])
                       + ((REAL(1.0) - mpc_par.relaxation) * stage->x[i]);
     }
-    project_onto_zero(product[ROW_SOC], &z[ROW_SOC], &y[ROW_SOC]);
-    project(product[ROW_T_CL], b->t_cl_low, b->t_cl_high, &z[ROW_T_CL], &y[ROW_T_CL]);
+    project_onto(product[ROW_SOC], REAL(0.0), &z[ROW_SOC], &y[ROW_SOC]);
+    project_onto(product[ROW_T_CL], b->t_cl, &z[ROW_T_CL], &y[ROW_T_CL]);
     for (int32_t i = ROW_FUEL; i < ROW_BATTERY; i++) {
         project(product[i], REAL(0.0), UNLIMITED, &z[i], &y[i]);
     }

@@ -35,6 +35,7 @@ typedef struct {
     real_t thermostat_open_degc;
     real_t thermostat_span_k;
     real_t radiator_w_per_k;
+    real_t thermostat_w_per_k; /* of the radiator, over the thermostat's span */
     real_t t_amb_degc;
     real_t cabin_heat_w;
     real_t cabin_heat_from_degc;

@@ -58,19 +58,35 @@ void qp_linearise_cold(mpc_state *state)
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         state->stage[k].about_t_degc = state->origin_t_degc;
         state->stage[k].about_fuel_g_per_s = DEPARTURE_FUEL_G_PER_S;
+        state->stage[k].about_p_eng_w = DEPARTURE_P_ENG_W;
+        state->stage[k].about_start_degc = state->origin_t_degc;
+        state->stage[k].about_end_degc = state->origin_t_degc;
     }
 }
 
-/* Mean coolant temperature and fuel rate of each stage of the last plan, in SI units. */
+/* The last plan, in SI units. alpha is taken at the mean temperature of a stage's own ends, for
+ * demand classes at that of their block's: the class that is driven first in the plan is driven all
+ * over the block on the road. */
 void qp_linearise_about_plan(mpc_state *state)
 {
-    real_t before = REAL(0.0);
+    real_t start = real_clip(state->origin_t_degc, COLDEST_DEGC, HOTTEST_DEGC);
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         mpc_stage *const stage = &state->stage[k];
-        const real_t mean = state->origin_t_degc + (REAL(0.5) * (before + stage->x[VAR_T_CL]));
-        stage->about_t_degc = real_clip(mean, COLDEST_DEGC, HOTTEST_DEGC);
+        stage->about_start_degc = start;
+        stage->about_end_degc = real_clip(state->origin_t_degc + stage->x[VAR_T_CL],
+                                          COLDEST_DEGC, HOTTEST_DEGC);
+        stage->about_t_degc = REAL(0.5) * (start + stage->about_end_degc);
         stage->about_fuel_g_per_s = real_max(stage->x[VAR_FUEL], REAL(0.0));
-        before = stage->x[VAR_T_CL];
+        stage->about_p_eng_w = real_max(stage->x[VAR_P_ENG], REAL(0.0));
+        start = stage->about_end_degc;
+    }
+    for (int32_t k = MPC_SHORT; k < MPC_STAGES; k += MPC_CLASSES) {
+        mpc_stage *const block = &state->stage[k];
+        const real_t mean =
+            REAL(0.5) * (block[0].about_start_degc + block[MPC_CLASSES - 1].about_end_degc);
+        for (int32_t i = 0; i < MPC_CLASSES; i++) {
+            block[i].about_t_degc = mean;
+        }
     }
 }
 
@@ -172,8 +188,10 @@ static real_t fill_soc_rows(mpc_stage *stage, int32_t is_first, real_t origin, r
     return reached;
 }
 
-/* Coolant balance about T^, F^, coolant limits, and what fuel and coolant weigh in the cost.
- * Returns the weight of the coolant temperature at each end of the stage. */
+/* Coolant balance with its thermostat, coolant limits, and what fuel and coolant weigh in the cost.
+ * The heat is q = (1 - x) (LHV alpha F - E) - UA (T - T_amb) - Q_cabin, expanded; what it makes of
+ * the coolant is expanded too. Temperatures in x count from the origin. Returns the weight of the
+ * coolant temperature at each end of the stage. */
 static real_t fill_coolant_rows(mpc_stage *stage, int32_t is_first, real_t origin_degc)
 {
     const real_t share = REAL(1.0) - mpc_par.exhaust_share;
@@ -181,23 +199,29 @@ static real_t fill_coolant_rows(mpc_stage *stage, int32_t is_first, real_t origi
     const real_t about = stage->about_t_degc;
     const real_t alpha = pwa_alpha(about);
     const real_t growth = pwa_alpha_slope(about) * stage->about_fuel_g_per_s;
-    const real_t rate = stage->duration_s / mpc_par.heat_capacity_j_per_k;
     const real_t ua = mpc_par.ua0_w_per_k + (mpc_par.ua1_w_per_k_per_mps * stage->speed_mps);
-    const real_t half = REAL(0.5) * rate * (ua - (heat_j_per_g * growth));
-    const real_t high =
-        rate * ((ua * (mpc_par.t_amb_degc - origin_degc))
-                - (heat_j_per_g * growth * (about - origin_degc)) - map_cabin_w(about));
-    const real_t radiator_w =
-        mpc_par.radiator_w_per_k * (mpc_par.t_cl_max_degc - mpc_par.t_amb_degc);
+    const real_t per_mean = ua - (heat_j_per_g * growth);
+    const real_t start = stage->about_start_degc - origin_degc;
+    const real_t ends = start + (stage->about_end_degc - origin_degc);
+    const real_t heat_at_zero = (ua * (mpc_par.t_amb_degc - origin_degc))
+                                - (heat_j_per_g * growth * (about - origin_degc))
+                                - map_cabin_w(about);
+    const real_t heat_w = (heat_j_per_g * alpha * stage->about_fuel_g_per_s)
+                          - (share * stage->about_p_eng_w) + heat_at_zero
+                          - (REAL(0.5) * per_mean * ends);
+    const real_t open = mpc_par.thermostat_open_degc - origin_degc;
+    const thermostat_end end = thermostat_step(stage->duration_s, start - open, heat_w);
+    const real_t half = REAL(0.5) * end.per_heat * per_mean;
+    const real_t equal =
+        (end.per_heat * (heat_at_zero - heat_w)) + end.u + open - (end.per_start * start);
     stage->a.t_cl[0] = (REAL(1.0) + half) * stage->column[VAR_T_CL];
     stage->a.t_cl[1] =
-        (is_first != 0) ? REAL(0.0) : ((half - REAL(1.0)) * stage->column[VAR_T_CL]);
-    stage->a.t_cl[2] = rate * share * stage->column[VAR_P_ENG];
-    stage->a.t_cl[3] = -rate * heat_j_per_g * alpha * stage->column[VAR_FUEL];
+        (is_first != 0) ? REAL(0.0) : ((half - end.per_start) * stage->column[VAR_T_CL]);
+    stage->a.t_cl[2] = end.per_heat * share * stage->column[VAR_P_ENG];
+    stage->a.t_cl[3] = -end.per_heat * heat_j_per_g * alpha * stage->column[VAR_FUEL];
     const real_t factor = normalise(stage->a.t_cl, 4);
     stage->row[ROW_T_CL] = factor;
-    stage->b.t_cl_high = high * factor;
-    stage->b.t_cl_low = (high - real_max(rate * radiator_w, ROW_GAP_K)) * factor;
+    stage->b.t_cl = equal * factor;
 
     stage->a.t_min[0] = stage->column[VAR_T_CL];
     stage->a.t_min[1] = stage->column[VAR_SLACK];

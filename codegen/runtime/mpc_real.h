@@ -11,12 +11,16 @@
 #if MPC_F32
 #define REAL_SQRT(x) sqrtf(x)
 #define REAL_POW(x, y) powf((x), (y))
+#define REAL_EXP(x) expf(x)
+#define REAL_LOG(x) logf(x)
 #define REAL_ABS(x) fabsf(x)
 #define REAL_FMIN(a, b) fminf((a), (b))
 #define REAL_FMAX(a, b) fmaxf((a), (b))
 #else
 #define REAL_SQRT(x) sqrt(x)
 #define REAL_POW(x, y) pow((x), (y))
+#define REAL_EXP(x) exp(x)
+#define REAL_LOG(x) log(x)
 #define REAL_ABS(x) fabs(x)
 #define REAL_FMIN(a, b) fmin((a), (b))
 #define REAL_FMAX(a, b) fmax((a), (b))

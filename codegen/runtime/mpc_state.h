@@ -49,8 +49,7 @@ typedef struct {
 
 /* Bounds other than 0, which the others have: soc = 0, fuel >= 0, p_max <= 0, slack >= 0. */
 typedef struct {
-    real_t t_cl_low;
-    real_t t_cl_high;
+    real_t t_cl; /* equal */
     real_t battery_low[MPC_BATTERY_PIECES];
     real_t p_min_low;
     real_t soc_low;
@@ -83,8 +82,12 @@ typedef struct {
     real_t net_w;
     real_t speed_mps;
     real_t internal_off_w; /* of the battery, engine off */
-    real_t about_t_degc;       /* alpha(T) F is expanded about these */
+    /* where the coolant's heat and the thermostat are expanded */
+    real_t about_t_degc; /* of alpha */
     real_t about_fuel_g_per_s;
+    real_t about_p_eng_w;
+    real_t about_start_degc;
+    real_t about_end_degc;
     stage_matrix a;
     stage_bounds b;
     real_t hessian[MPC_VARS]; /* diagonal */

@@ -6,15 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.preview.stages import StageBuilder, Stages
-from qpmpc.qp.stage_qp import Linearisation, QpData, StageQp
-from qpmpc.qp.structure import VARS, Var
+from qpmpc.qp.linearisation import Linearisation
+from qpmpc.qp.stage_qp import QpData, StageQp
+from qpmpc.qp.structure import VARS
 from qpmpc.solvers.base import QpSolution, QpSolver
 
 Floats = NDArray[np.float64]
 
-COLDEST_DEGC, HOTTEST_DEGC = 0.0, 100.0  # where a linearisation point may lie
 DEPARTURE_LINEARISATIONS = 5
-DEPARTURE_FUEL_G_PER_S = 0.3
 FAILURES_FORGIVEN = 2  # unusable solutions in a row that do not cost the plan before them
 WARM_UP_STEPS = 5  # of K iterations; measured: fewer gain nothing, more leave the rules driving
 
@@ -75,12 +74,12 @@ class Planner:
     def prepare(self, step: int, soc: float, t_cl_degc: float) -> None:
         """Solve the QP of time step `step` from cold, with several linearisations, to the end."""
         stages = self.preview.at(step)
-        about, start = self._cold_start(stages, t_cl_degc)
+        about, start = Linearisation.constant(self.preview.count, t_cl_degc), None
         for _ in range(DEPARTURE_LINEARISATIONS):
             plan = self._solve(stages, soc, t_cl_degc, about, start, cold=True)
             if not plan.solution.usable:
                 return
-            about, start = self._linearisation(plan.x, t_cl_degc), (plan.x, plan.duals)
+            about, start = self._about(plan.x, t_cl_degc), (plan.x, plan.duals)
         self.plan, self._plan_step, self._solves = plan, step, WARM_UP_STEPS
 
     def solve(self, step: int, soc: float, t_cl_degc: float) -> Plan:
@@ -92,12 +91,12 @@ class Planner:
         """
         stages = self.preview.at(step)
         if self.plan is None:
-            about, start = self._cold_start(stages, t_cl_degc)
+            about, start = Linearisation.constant(self.preview.count, t_cl_degc), None
         else:
             x, duals = self.plan.x, self.plan.duals
             for _ in range(step - self._plan_step):
                 x, duals = x[self._shift], duals[self._shift]
-            about, start = self._linearisation(x, t_cl_degc), (x, duals)
+            about, start = self._about(x, t_cl_degc), (x, duals)
         plan = self._solve(stages, soc, t_cl_degc, about, start)
         if plan.solution.usable:
             self.plan, self._plan_step = plan, step
@@ -113,12 +112,8 @@ class Planner:
         """Forget the last solution, as after a restart of the controller on the road."""
         self.plan, self._solves, self._failures = None, 0, 0
 
-    @staticmethod
-    def _cold_start(
-        stages: Stages, t_cl_degc: float
-    ) -> tuple[Linearisation, tuple[Floats, Floats] | None]:
-        n = len(stages.duration_s)
-        return Linearisation(np.full(n, t_cl_degc), np.full(n, DEPARTURE_FUEL_G_PER_S)), None
+    def _about(self, x: Floats, t_cl_degc: float) -> Linearisation:
+        return Linearisation.about(x, t_cl_degc, self.preview.settings)
 
     def _solve(
         self,
@@ -144,15 +139,4 @@ class Planner:
             data.scaling.primal(solution.z).reshape(-1, VARS),
             data.scaling.dual(solution.y).reshape(len(stages.duration_s), -1),
             solution,
-        )
-
-    @staticmethod
-    def _linearisation(x: Floats, t_cl_degc: float) -> Linearisation:
-        """Mean coolant temperature and fuel rate of each stage of a solution."""
-        end = x[:, Var.T_CL]
-        mean = 0.5 * end
-        mean[0] += 0.5 * t_cl_degc
-        mean[1:] += 0.5 * end[:-1]
-        return Linearisation(
-            np.clip(mean, COLDEST_DEGC, HOTTEST_DEGC), np.maximum(x[:, Var.FUEL], 0.0)
         )

@@ -20,7 +20,7 @@ class HorizonSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    short_stages: Annotated[int, Field(ge=1, le=2000)] = 5
+    short_stages: Annotated[int, Field(ge=1, le=2000)] = 20
     blocks: Annotated[int, Field(ge=0, le=500)] = 7
     block_s: Annotated[int, Field(ge=0, le=3600)] = 120
     classes: Literal[1, 3] = 3

@@ -2,8 +2,9 @@
 
 from typing import TYPE_CHECKING, Any
 
+from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.scaling import Scaling, ScalingSettings
-from qpmpc.qp.stage_qp import Linearisation, QpData, QpSettings, StageQp
+from qpmpc.qp.stage_qp import QpData, QpSettings, StageQp
 from qpmpc.qp.structure import VARS, QpStructure, Rows, Var
 
 if TYPE_CHECKING:

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 from qpmpc.errors import QpmpcError
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
+from qpmpc.qp.coolant import coolant_row
+from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.scaling import Scaling
 from qpmpc.qp.stage_qp import (
     ACCURATE_STAGE_S,
     REACH_MARGIN_SOC,
-    ROW_GAP,
     SIGMA_FORCED,
     T_CL_MAX_MARGIN_K,
-    Linearisation,
     QpSettings,
 )
 from qpmpc.qp.structure import VARS, Var
@@ -102,10 +102,12 @@ class CvxpyTwin:
         self._soc_low, self._soc_high = each("soc_low"), each("soc_high")
         self._h_alpha = each("h_alpha", nonneg=True)  # h alpha(T^)
         self._h_growth = each("h_growth")  # h alpha'(T^) F^
-        self._h_growth_at = each("h_growth_at")  # h alpha'(T^) F^ T^
-        self._h_ua = each("h_ua", nonneg=True)  # h UA(v)
-        self._h_cabin = each("h_cabin", nonneg=True)  # h Q_heat(T^)
-        self._waste_k = each("waste_k", nonneg=True)  # what the radiator may take, as K
+        # the coolant's row, see `CoolantRow`
+        self._per_start = each("per_start", nonneg=True)
+        self._per_heat = each("per_heat", nonneg=True)
+        self._per_fuel = each("per_fuel", nonneg=True)  # per_heat alpha(T^)
+        self._per_mean = each("per_mean")  # per_heat w_per_k
+        self._constant_degc = each("constant_degc")
         self._smoothing = {var: each(f"smoothing_{var.name}", nonneg=True) for var in Var}
 
     def _before(self, var: Var) -> Any:
@@ -135,23 +137,17 @@ class CvxpyTwin:
         ]
 
     def _coolant(self) -> list[Any]:
-        """C (T - T_before) = h [(1 - x)(LHV alpha F - E) - UA (T - T_amb) - Q_heat] - radiator."""
+        """Heat balance with its thermostat, expanded (`CoolantRow`), and soft limits."""
         th, settings = self.vehicle.thermal, self.settings
         lhv_j_per_g, share = self.vehicle.engine.lhv_j_per_g, 1.0 - th.exhaust_share
         before = self._before(Var.T_CL)
         mean = 0.5 * (before + self.t_cl_degc)
-        # h alpha(T) F, expanded about T^ and F^
-        burnt_g = (
-            cp.multiply(self._h_alpha, self.fuel_g_per_s)
-            + cp.multiply(self._h_growth, mean)
-            - self._h_growth_at
-        )
-        heat_j = share * (lhv_j_per_g * burnt_g - cp.multiply(self._h, self.p_eng_w))
-        heat_j += self._h_ua * th.t_amb_degc - cp.multiply(self._h_ua, mean) - self._h_cabin
-        wasted_k = before + heat_j / th.heat_capacity_j_per_k - self.t_cl_degc
+        burnt = lhv_j_per_g * cp.multiply(self._per_fuel, self.fuel_g_per_s)
+        driven = cp.multiply(self._per_heat, self.p_eng_w)
+        heated = share * (burnt - driven) - cp.multiply(self._per_mean, mean)
+        kept = cp.multiply(self._per_start, before)
         return [
-            wasted_k >= 0.0,
-            wasted_k <= self._waste_k,
+            self.t_cl_degc == kept + heated + self._constant_degc,
             self.t_cl_degc + self.t_slack_k >= th.t_cl_min_degc + settings.t_cl_margin_k,
             self.t_cl_degc - self.t_slack_k <= th.t_cl_max_degc - T_CL_MAX_MARGIN_K,
             self.t_slack_k >= 0.0,
@@ -184,11 +180,11 @@ class CvxpyTwin:
         ----------
         stages : the road ahead, n stages
         soc, t_cl_degc : state at the start of the horizon
-        about : T^ and F^
+        about : linearisation point
         scaling : the regularisation of `StageQp` is defined in its solver units; with its scaling
             it is the same here, without there is none
         """
-        battery, engine, th = self.vehicle.battery, self.vehicle.engine, self.vehicle.thermal
+        battery, engine = self.vehicle.battery, self.vehicle.engine
         h, net_w = stages.duration_s, stages.net_w
         missing_w = net_w - battery.power_discharge_max_w
         self._soc_now.value, self._t_cl_now.value = soc, t_cl_degc
@@ -197,17 +193,13 @@ class CvxpyTwin:
         self._missing_w.value = np.maximum(missing_w - engine.power_min_w, 0.0)
         self._on_least.value = np.where(missing_w > 0.0, SIGMA_FORCED, 0.0)
         self._soc_low.value, self._soc_high.value = self._soc_limits(stages, soc)
-        growth = self.model.alpha.active_slope(about.t_cl_degc) * about.fuel_g_per_s
-        self._h_alpha.value = h * self.model.alpha(about.t_cl_degc)
-        self._h_growth.value = h * growth
-        self._h_growth_at.value = h * growth * about.t_cl_degc
-        self._h_ua.value = h * (th.ua0_w_per_k + th.ua1_w_per_k_per_mps * stages.speed_mps)
-        fade = (about.t_cl_degc - th.cabin_heat_from_degc) / (
-            th.cabin_heat_full_degc - th.cabin_heat_from_degc
-        )
-        self._h_cabin.value = h * th.cabin_heat_w * np.clip(fade, 0.0, 1.0)
-        radiator_w = th.radiator_w_per_k * (th.t_cl_max_degc - th.t_amb_degc)
-        self._waste_k.value = np.maximum(h * radiator_w / th.heat_capacity_j_per_k, ROW_GAP)
+        row = coolant_row(self.vehicle, self.model, stages, about)
+        self._h_alpha.value = h * row.alpha
+        self._h_growth.value = h * row.growth_g_per_s_per_k
+        self._per_start.value, self._per_heat.value = row.per_start, row.per_heat_k_per_w
+        self._per_fuel.value = row.per_heat_k_per_w * row.alpha
+        self._per_mean.value = row.per_heat_k_per_w * row.w_per_k
+        self._constant_degc.value = row.constant_degc
         self._smooth(scaling)
 
     def _soc_limits(self, stages: Stages, soc: float) -> tuple[Floats, Floats]:

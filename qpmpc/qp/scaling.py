@@ -27,7 +27,7 @@ class ScalingSettings(BaseModel):
     power_w: Positive = 10e3
     fuel_g_per_s: Positive = 1.0
     energy_j: Positive = 40e3
-    t_cl_k: Positive = 1.0
+    t_cl_k: Positive = 2.0
     duration_exponent: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
 
 

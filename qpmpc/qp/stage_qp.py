@@ -9,6 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
+from qpmpc.qp.coolant import coolant_row
+from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.scaling import Scaling, ScalingSettings
 from qpmpc.qp.structure import VARS, QpStructure, Rows, Var
 from qpmpc.vehicle.parameters import Vehicle
@@ -18,7 +20,6 @@ Weight = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 SHORTEST_SCALE_S = 1.0  # a masked stage is scaled as one of 1 s
 T_CL_MAX_MARGIN_K = 0.05  # small: the radiator is fully open only at the limit itself
-ROW_GAP = 1e-2  # K; even a masked coolant row keeps two bounds, so no row turns into an equality
 REACH_MARGIN_SOC = 1e-5
 ACCURATE_STAGE_S = 1.0  # a stage of this length or less is known, a longer one is forecast
 SIGMA_FORCED = 0.99  # "engine must be on" as a lower bound on sigma, kept apart from the upper one
@@ -45,22 +46,8 @@ class QpSettings(BaseModel):
     soc_penalty_g: Annotated[float, Field(ge=0.0)] = 0.0
     soc_reserve: Annotated[float, Field(ge=0.0, le=0.9)] = 0.4
     t_cl_margin_k: Annotated[float, Field(ge=0.0, le=10.0)] = 0.5
-    slack_g_per_k: Weight = 5.0
+    slack_g_per_k: Weight = 10.0
     regularisation: Annotated[float, Field(ge=0.0, le=1.0)] = 1e-5
-
-
-@dataclass(frozen=True)
-class Linearisation:
-    """Point about which alpha(T) F is expanded, stage by stage; shape (n,) each.
-
-    Attributes
-    ----------
-    t_cl_degc : mean coolant temperature of the stage
-    fuel_g_per_s : mean nominal fuel rate
-    """
-
-    t_cl_degc: Floats
-    fuel_g_per_s: Floats
 
 
 @dataclass(frozen=True)
@@ -125,7 +112,7 @@ class StageQp:
         ----------
         stages : the road ahead, n stages
         soc, t_cl_degc : state at the start of the horizon
-        about : T^ and F^
+        about : linearisation point
 
         Returns
         -------
@@ -221,34 +208,22 @@ class StageQp:
     def _fill_coolant(
         self, stages: Stages, t_cl_degc: float, about: Linearisation
     ) -> tuple[Floats, Floats]:
-        """Coolant balance about T^, F^; returns the cost weights of F and of T at both ends."""
-        index, rows, th = self.structure.index, self.rows, self.vehicle.thermal
-        h, share = stages.duration_s, 1.0 - th.exhaust_share
-        lhv_j_per_g = self.vehicle.engine.lhv_j_per_g
-        alpha = self.model.alpha(about.t_cl_degc)
-        growth = self.model.alpha.active_slope(about.t_cl_degc) * about.fuel_g_per_s
-        rate = h / th.heat_capacity_j_per_k  # K per W
-        ua = th.ua0_w_per_k + th.ua1_w_per_k_per_mps * stages.speed_mps
-        half = 0.5 * rate * (ua - share * lhv_j_per_g * growth)
+        """Coolant row; returns the cost weights of F and of T at both ends of the stage."""
+        index, rows, h = self.structure.index, self.rows, stages.duration_s
+        row = coolant_row(self.vehicle, self.model, stages, about)
+        share = 1.0 - self.vehicle.thermal.exhaust_share
+        rate = row.per_heat_k_per_w * share
+        half = 0.5 * row.per_heat_k_per_w * row.w_per_k
+        before = half - row.per_start
+        burnt = rate * self.vehicle.engine.lhv_j_per_g * row.alpha
         self._values[:, index[rows.t_cl, Var.T_CL, False]] = 1.0 + half
-        self._values[:, index[rows.t_cl, Var.T_CL, True]] = half - 1.0
-        self._values[:, index[rows.t_cl, Var.FUEL, False]] = -rate * share * lhv_j_per_g * alpha
-        self._values[:, index[rows.t_cl, Var.P_ENG, False]] = rate * share
-        upper = rate * (
-            ua * th.t_amb_degc
-            - share * lhv_j_per_g * growth * about.t_cl_degc
-            - self._cabin_w(about.t_cl_degc)
-        )
-        upper[0] += (1.0 - half[0]) * t_cl_degc
-        radiator = th.radiator_w_per_k * (th.t_cl_max_degc - th.t_amb_degc)
-        self._upper[:, rows.t_cl] = upper
-        self._lower[:, rows.t_cl] = upper - np.maximum(rate * radiator, ROW_GAP)
-        return h * alpha, 0.5 * h * growth
-
-    def _cabin_w(self, t_cl_degc: Floats) -> Floats:
-        th = self.vehicle.thermal
-        span = th.cabin_heat_full_degc - th.cabin_heat_from_degc
-        return th.cabin_heat_w * np.clip((t_cl_degc - th.cabin_heat_from_degc) / span, 0.0, 1.0)
+        self._values[:, index[rows.t_cl, Var.T_CL, True]] = before
+        self._values[:, index[rows.t_cl, Var.FUEL, False]] = -burnt
+        self._values[:, index[rows.t_cl, Var.P_ENG, False]] = rate
+        self._lower[:, rows.t_cl] = row.constant_degc
+        self._lower[0, rows.t_cl] -= before[0] * t_cl_degc
+        self._upper[:, rows.t_cl] = self._lower[:, rows.t_cl]
+        return h * row.alpha, 0.5 * h * row.growth_g_per_s_per_k
 
     def _scaled(self, duration_s: Floats, cost: Floats) -> QpData:
         """Scale to solver units: columns by unit and duration, rows to unit norm, cost to one."""

@@ -46,7 +46,7 @@ class Rows:
 
     @property
     def t_cl(self) -> int:
-        """Coolant balance; the radiator may take up to its full power, so two-sided."""
+        """Coolant balance, thermostat included."""
         return 1
 
     @property

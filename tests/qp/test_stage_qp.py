@@ -23,7 +23,7 @@ def _qp(**settings):
 
 
 def _about(n=BUILDER.count, t_cl_degc=50.0, fuel=0.3):
-    return Linearisation(np.full(n, t_cl_degc), np.full(n, fuel))
+    return Linearisation.constant(n, t_cl_degc, fuel)
 
 
 def _unscaled(qp, data):

@@ -36,7 +36,7 @@ def growth(vehicle: Vehicle) -> list[dict[str, Any]]:
     for count in STAGES:
         at = np.arange(count) % trace.steps
         stages = Stages(np.ones(count), net[at], speed[at], off[at])
-        about = Linearisation(np.full(count, 60.0), np.full(count, 0.3))
+        about = Linearisation.constant(count, 60.0)
         qp = StageQp(vehicle, model, count, settings.qp, settings.scaling)
         solver = Osqp(settings.osqp)
         solver.setup(qp.structure, qp.update(stages, 0.6, 60.0, about))

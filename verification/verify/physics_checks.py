@@ -85,7 +85,7 @@ def constant_demand(context: Context) -> Iterator[Check]:
         stages = Stages(
             np.full(n, duration / n), np.full(n, net_w), np.full(n, 10.0), np.full(n, off_w)
         )
-        about = Linearisation(np.full(n, 50.0), np.full(n, 0.3))
+        about = Linearisation.constant(n, 50.0)
         data = qp.update(stages, vehicle.trip.soc_init, 50.0, about)
         solver = make_solver("piqp", 1e-9)
         solver.setup(qp.structure, data)

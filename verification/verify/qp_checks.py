@@ -69,7 +69,6 @@ def _program(loop: Loop, curves: Curves, step: int) -> StageProgram:
     tr, vehicle = loop.run.trajectory, loop.run.vehicle
     state = (float(tr.soc[step]), float(tr.t_cl_degc[step]))
     about = expansion(loop.x(step - 1), loop.settings, state[1])
-    about = (np.clip(about[0], 0.0, 100.0), about[1])
     road = horizon(loop.cycle, vehicle, loop.settings, step)
     return stage_program(vehicle, curves, loop.settings, road, state, about)
 
@@ -250,7 +249,7 @@ def scaling_is_neutral(context: Context) -> Iterator[Check]:
     model = PwaModel.of(vehicle)
     truth = Trace.of(loop.cycle, vehicle)
     preview = StageBuilder(vehicle, truth, truth, HorizonSettings())
-    about = Linearisation(np.full(preview.count, 48.0), np.full(preview.count, 0.3))
+    about = Linearisation.constant(preview.count, 48.0)
     fuels = []
     units = (
         ScalingSettings(),

@@ -48,8 +48,7 @@ def expansion_error(loop: Loop, step: int) -> tuple[float, float]:
     equations, controller = Equations(loop.run.vehicle), loop.controller
     measured = float(loop.run.trajectory.t_cl_degc[step])
     x = loop.x(step)
-    about_t, about_f = expansion(loop.x(step - 1), loop.settings, measured)
-    about_t = np.clip(about_t, 0.0, 100.0)
+    about_t, about_f, *_ = expansion(loop.x(step - 1), loop.settings, measured)
     ends = x[:, T_CL]
     mean = 0.5 * (ends + np.concatenate([[measured], ends[:-1]]))
     h = controller.planner.preview.at(step).duration_s

@@ -5,6 +5,7 @@ agree with this.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,11 +62,22 @@ def horizon(cycle: Cycle, vehicle: Vehicle, settings: MhQpSettings, step: int) -
     return Horizon(*np.array(rows).T)
 
 
-def expansion(previous: Floats, settings: MhQpSettings, t_cl_degc: float) -> tuple[Floats, Floats]:
-    """Point T^, F^ of the expansion: the previous step's solution, each stage from itself.
+class Expansion(NamedTuple):
+    """Point of expansion: T^ of alpha, F^, E^, T at both ends of the stage; shape (n,) each."""
+
+    t_cl_degc: Floats
+    fuel_g_per_s: Floats
+    p_eng_w: Floats
+    begin_degc: Floats
+    end_degc: Floats
+
+
+def expansion(previous: Floats, settings: MhQpSettings, t_cl_degc: float) -> Expansion:
+    """Expand about the previous step's solution.
 
     A short stage takes the solution of the stage that was one second later; the last short one
-    and the long ones keep theirs.
+    and the long ones keep theirs. alpha is taken at the mean of a stage's own ends, in a block of
+    demand classes at the mean of the block's.
 
     Parameters
     ----------
@@ -73,9 +85,15 @@ def expansion(previous: Floats, settings: MhQpSettings, t_cl_degc: float) -> tup
     t_cl_degc : measured
     """
     moved = shifted(previous, settings)
-    ends = moved[:, T_CL]
+    ends = np.clip(moved[:, T_CL], 0.0, 100.0)
     begins = np.concatenate([[t_cl_degc], ends[:-1]])
-    return 0.5 * (begins + ends), np.maximum(moved[:, FUEL], 0.0)
+    middle = 0.5 * (begins + ends)
+    grid = settings.horizon
+    for first in range(grid.short_stages, len(ends), grid.classes):
+        last = first + grid.classes - 1
+        middle[first : last + 1] = 0.5 * (begins[first] + ends[last])
+    fuel, power = np.maximum(moved[:, FUEL], 0.0), np.maximum(moved[:, P_ENG], 0.0)
+    return Expansion(middle, fuel, power, begins, ends)
 
 
 def shifted(values: Floats, settings: MhQpSettings) -> Floats:
@@ -118,7 +136,7 @@ class StageProgram:
         size = np.abs(self.equal * x).max(axis=1) + np.abs(self.equal_to) + 1e-9
         off = np.abs(self.equal @ x - self.equal_to) / size
         if off.size and off.max() > over.max():
-            return float(off.max()), "SOC dynamics"
+            return float(off.max()), "dynamics"
         return float(over.max()), self.names[int(np.argmax(over))]
 
 
@@ -155,9 +173,9 @@ def stage_program(
     settings: MhQpSettings,
     road: Horizon,
     state: tuple[float, float],
-    about: tuple[Floats, Floats],
+    about: Expansion,
 ) -> StageProgram:
-    """Write the problem down for one horizon, one state (SOC, degC) and one expansion (T^, F^)."""
+    """Write the problem down for one horizon, one state (SOC, degC) and one expansion."""
     equations, battery, th = Equations(vehicle), vehicle.battery, vehicle.thermal
     engine, qp = vehicle.engine, settings.qp
     n = len(road.h)
@@ -165,11 +183,10 @@ def stage_program(
     cost = np.zeros(n * COUNT)
     energy = float(equations.voltage_v(vehicle.trip.soc_init)) * 3600.0 * battery.capacity_ah
     lhv, share = equations.lhv_j_per_g, 1.0 - th.exhaust_share
-    radiator = th.radiator_w_per_k * (th.t_cl_max_degc - th.t_amb_degc)
     reach = state[0]
     for k in range(n):
         h, net, off = float(road.h[k]), float(road.net_w[k]), float(road.off_w[k])
-        t0, f0 = float(about[0][k]), float(about[1][k])
+        t0, f0, e0, begin, end = (float(part[k]) for part in about)
         at = {name: k * COUNT + name for name in range(COUNT)}
         before = {name: at[name] - COUNT for name in (SOC, T_CL)}
         # alpha and its slope: the piece that is highest at T^
@@ -187,24 +204,30 @@ def stage_program(
             terms[before[SOC]] = -1.0
         same.add("SOC", state[0] if k == 0 else 0.0, terms)
 
-        # C (T - T_before) = h [(1-x)(LHV (alpha F + growth (Tm - T^)) - E) - UA (Tm - T_amb) - Q]
+        # T = T_end(q^, T^_begin) + dT/dq (q - q^) + dT/dT_begin (T_before - T^_begin), with
+        # q = (1-x)(LHV (alpha F + growth (Tm - T^)) - E) - UA (Tm - T_amb) - Q
         ua = float(equations.ua_w_per_k(road.speed_mps[k]))
-        rate = h / th.heat_capacity_j_per_k
-        loss = 0.5 * rate * (ua - share * lhv * growth)
+        per_mean = ua - share * lhv * growth
+        gain = ua * th.t_amb_degc - share * lhv * growth * t0 - float(equations.cabin_w(t0))
+        heat = share * (lhv * alpha * f0 - e0) + gain - per_mean * 0.5 * (begin + end)
+
+        def after(q: float, t: float, h: float = h) -> float:
+            return equations.coolant_after_degc(h, t, q)
+
+        per_heat = (after(heat + 1.0, begin) - after(heat - 1.0, begin)) / 2.0
+        per_begin = (after(heat, begin + 1e-4) - after(heat, begin - 1e-4)) / 2e-4
+        loss = 0.5 * per_heat * per_mean
         terms = {
             at[T_CL]: 1.0 + loss,
-            at[FUEL]: -rate * share * lhv * alpha,
-            at[P_ENG]: rate * share,
+            at[FUEL]: -per_heat * share * lhv * alpha,
+            at[P_ENG]: per_heat * share,
         }
-        gain = ua * th.t_amb_degc - share * lhv * growth * t0 - float(equations.cabin_w(t0))
-        balance = rate * gain
+        balance = after(heat, begin) + per_heat * (gain - heat) - per_begin * begin
         if k:
-            terms[before[T_CL]] = loss - 1.0
+            terms[before[T_CL]] = loss - per_begin
         else:
-            balance += (1.0 - loss) * state[1]
-        rows.add("coolant", balance, terms)
-        waste = max(rate * radiator, 1e-2)
-        rows.add("radiator", waste - balance, {c: -v for c, v in terms.items()})
+            balance += (per_begin - loss) * state[1]
+        same.add("coolant", balance, terms)
 
         for a, b in zip(curves.fuel.slope, curves.fuel.intercept, strict=True):
             rows.add("fuel piece", 0.0, {at[FUEL]: -1.0, at[P_ENG]: a, at[ON]: b})
