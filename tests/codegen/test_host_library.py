@@ -185,7 +185,7 @@ BAD = [
     ({"long_speed_mps": (3, math.inf)}, BAD_PREVIEW),
     ({"long_internal_off_w": (3, math.nan)}, BAD_PREVIEW),
     ({"short_count": 0}, BAD_PREVIEW),
-    ({"short_count": 6}, BAD_PREVIEW),
+    ({"short_count": 21}, BAD_PREVIEW),
     ({"soc": math.nan, "short_count": -(2**31)}, BAD_MEASUREMENT | BAD_PREVIEW),
 ]
 

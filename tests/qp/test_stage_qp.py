@@ -64,8 +64,9 @@ def test_values_are_fit_for_a_fixed_iteration_solver(step, soc, t_cl_degc, fuel)
     # No row may turn into an equality or back (the solver's step size depends on it).
     rows = qp.rows.count
     equality = (data.upper - data.lower < 1e-4).reshape(-1, rows)
-    assert equality[:, qp.rows.soc].all()
-    assert not np.delete(equality, qp.rows.soc, axis=1).any()
+    states = [qp.rows.soc, qp.rows.t_cl]
+    assert equality[:, states].all()
+    assert not np.delete(equality, states, axis=1).any()
     norms = np.sqrt(np.square(qp.structure.matrix_of(data.a_data).toarray()).sum(axis=1))
     np.testing.assert_allclose(norms, 1.0, rtol=1e-12)
 

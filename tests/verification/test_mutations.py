@@ -16,6 +16,8 @@ import pytest
 import qpmpc.preview.forecast
 import qpmpc.preview.stages
 import qpmpc.pwa.model
+import qpmpc.qp.stage_qp
+import qpmpc.verification.verify.physics_checks
 from qpmpc.controllers.mh_qp import MhQp
 from qpmpc.preview.forecast import Trace
 from qpmpc.preview.stages import StageBuilder
@@ -28,7 +30,11 @@ from qpmpc.vehicle.engine import OptimalLine
 from qpmpc.verification.verify import GROUPS, Context, Group, run_checks
 from qpmpc.verification.verify.balance_checks import books_balance, limits_kept
 from qpmpc.verification.verify.bound_checks import bound_below_everything
-from qpmpc.verification.verify.physics_checks import constant_demand, engine_covers_demand
+from qpmpc.verification.verify.physics_checks import (
+    constant_demand,
+    engine_covers_demand,
+    thermostat_exact,
+)
 from qpmpc.verification.verify.pwa_checks import bounds_hold, trip_error_small
 from qpmpc.verification.verify.qp_checks import (
     same_optimum,
@@ -115,15 +121,15 @@ MUTATIONS = [
         "(k - self.entry_before) * VARS", "(k - 2 * self.entry_before) * VARS", QP,
     ),
     Mutation(
-        "alpha' = 0", StageQp, "_fill_coolant",
-        "growth = self.model", "growth = 0.0 * self.model", QP,
+        "alpha' = 0", qpmpc.qp.stage_qp, "coolant_row",
+        "* about.fuel_g_per_s\n    ua", "* 0.0\n    ua", QP,
     ),
     Mutation(
         "wrong terminal band", StageQp, "_terminal",
         "return multiple", "return 0.98 * multiple", QP,
     ),
     Mutation(
-        "UA of a stage in km/h", StageQp, "_fill_coolant",
+        "UA of a stage in km/h", qpmpc.qp.stage_qp, "coolant_row",
         "* stages.speed_mps", "* 3.6 * stages.speed_mps", QP,
     ),
     Mutation(
@@ -144,8 +150,13 @@ MUTATIONS = [
         "t_cl_weight[1:]", "t_cl_weight[:-1]", QP,
     ),
     Mutation(
-        "no cabin heat", StageQp, "_fill_coolant",
-        "- self._cabin_w(about.t_cl_degc)", "", QP,
+        "no cabin heat", qpmpc.qp.stage_qp, "coolant_row",
+        "heat_at_zero -= _cabin_w(th, about.t_cl_degc)", "", QP,
+    ),
+    Mutation(
+        "radiator of a stage as open as at its end", qpmpc.verification.verify.physics_checks, "coolant_step",
+        "end = np.select(cases, [after_line,",
+        "end = np.select(cases, [straight / (1.0 + duration_s / tau),", (thermostat_exact,),
     ),
     # scaling and warm start
     Mutation(

@@ -9,6 +9,7 @@ from qpmpc.cycles import load_cycle
 from qpmpc.preview import Stages
 from qpmpc.pwa import PwaModel
 from qpmpc.qp import Linearisation, QpSettings, ScalingSettings, StageQp
+from qpmpc.qp.coolant import coolant_step
 from qpmpc.simulate import simulate
 from qpmpc.solvers.registry import make_solver
 from qpmpc.vehicle import Vehicle
@@ -18,12 +19,15 @@ from qpmpc.verification.verify.context import Context
 
 CYCLE = "nycc"
 SAME, TABLES = 1e-9, 1e-3
+STAGES_TRIED, THERMOSTAT_K = 2000, 1e-4
 NOISE_G = 0.02  # a controller of finite accuracy may be off by this between two cases
 NO_HEAT: dict[str, object] = {
     "cold_engine.k": 0.0,
     "thermal.cabin_heat_w": 0.0,
     "thermal.t_cl_min_degc": -90.0,
 }
+# so much coolant that nothing heats it
+NO_HOT_LIMIT: dict[str, object] = {"thermal.heat_capacity_j_per_k": 1e9}
 
 
 def _fuel_g(
@@ -67,6 +71,35 @@ def uncoupled(context: Context) -> Iterator[Check]:
     )
 
 
+def thermostat_exact(context: Context) -> Iterator[Check]:
+    """Coolant over long stages, the thermostat opening and closing on the way."""
+    thermal, equations = context.vehicle.thermal, Equations(context.vehicle)
+    rng = np.random.default_rng(7)
+    duration = rng.choice([1.0, 20.0, 60.0, 200.0], STAGES_TRIED)
+    start, heat = rng.uniform(75.0, 91.0, STAGES_TRIED), rng.uniform(-15e3, 30e3, STAGES_TRIED)
+    after = np.vectorize(equations.coolant_after_degc)
+    end, per_heat, per_start = coolant_step(thermal, duration, start, heat)
+    step_w, step_k = 1.0, 1e-5
+    by_heat = after(duration, start, heat + step_w) - after(duration, start, heat - step_w)
+    by_start = after(duration, start + step_k, heat) - after(duration, start - step_k, heat)
+    worst = max(
+        float(np.abs(end - after(duration, start, heat)).max()),
+        float(np.abs(per_heat - by_heat / (2.0 * step_w)).max() * 1e3),
+        float(np.abs(per_start - by_start / (2.0 * step_k)).max()),
+    )
+    opened = np.count_nonzero((start < thermal.thermostat_open_degc) & (per_start < 1.0))
+    closed = np.count_nonzero((start > thermal.thermostat_open_degc) & (end < 85.0))
+    yield Check(
+        "Thermostat within a stage",
+        "Coolant at the end of a stage, and what a kW or a kelvin more makes of it, are those of "
+        "the two linear regimes driven through one after the other.",
+        THERMOSTAT_K,
+        worst,
+        "K",
+        f"{STAGES_TRIED} stages of 1 to 200 s; it opens in {opened}, closes in {closed}",
+    )
+
+
 def constant_demand(context: Context) -> Iterator[Check]:
     """Constant demand, hot engine: the QP's optimum is known in closed form.
 
@@ -75,7 +108,7 @@ def constant_demand(context: Context) -> Iterator[Check]:
 
         fuel rate = min_p f(p) l(P0) / (l(P0) - G(P0 - p))
     """
-    vehicle = context.vehicle.with_settings(NO_HEAT)
+    vehicle = context.vehicle.with_settings({**NO_HEAT, **NO_HOT_LIMIT})
     model, equations = PwaModel.of(vehicle), Equations(vehicle)
     n, duration = 20, 600.0
     qp = StageQp(vehicle, model, n, QpSettings(regularisation=1e-9), ScalingSettings())

@@ -60,6 +60,7 @@ GROUPS = (
         "Physics",
         (
             physics_checks.constant_demand,
+            physics_checks.thermostat_exact,
             physics_checks.engine_covers_demand,
             physics_checks.uncoupled,
             physics_checks.monotone,

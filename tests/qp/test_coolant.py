@@ -1,0 +1,78 @@
+"""Coolant over a stage with its thermostat: against brute force, and where it must be simple."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from qpmpc.qp.coolant import coolant_step, radiator_w_per_k
+from qpmpc.vehicle import Plant, load_vehicle
+
+VEHICLE = load_vehicle()
+THERMAL = VEHICLE.thermal
+durations = st.floats(0.0, 300.0)
+temperatures = st.floats(40.0, 92.0)
+heats = st.floats(-20e3, 30e3)
+
+
+def _step(duration_s, start_degc, heat_w):
+    parts = coolant_step(THERMAL, *(np.array([v]) for v in (duration_s, start_degc, heat_w)))
+    return [float(part[0]) for part in parts]
+
+
+def _brute_force(duration_s, start_degc, heat_w, steps=20_000):
+    slope, t = radiator_w_per_k(THERMAL), start_degc
+    for _ in range(steps):
+        radiator_w = slope * max(t - THERMAL.thermostat_open_degc, 0.0)
+        t += duration_s / steps * (heat_w - radiator_w) / THERMAL.heat_capacity_j_per_k
+    return t
+
+
+@pytest.mark.parametrize(
+    ("duration_s", "start_degc", "heat_w"),
+    [
+        (200.0, 60.0, 5e3),  # closed all the time
+        (200.0, 80.0, 15e3),  # opens
+        (200.0, 88.0, 8e3),  # open all the time
+        (200.0, 88.0, -5e3),  # closes
+        (1.0, 84.99, 20e3),
+    ],
+)
+def test_end_is_that_of_many_small_steps(duration_s, start_degc, heat_w):
+    expected = _brute_force(duration_s, start_degc, heat_w)
+    assert _step(duration_s, start_degc, heat_w)[0] == pytest.approx(expected, abs=1e-3)
+
+
+@settings(max_examples=300, deadline=None)
+@given(duration_s=durations, start_degc=temperatures, heat_w=heats)
+def test_derivatives_are_those_of_the_end(duration_s, start_degc, heat_w):
+    _, per_heat, per_start = _step(duration_s, start_degc, heat_w)
+    dq, dt = 1e-2, 1e-5
+    plus = _step(duration_s, start_degc, heat_w + dq)[0]
+    minus = _step(duration_s, start_degc, heat_w - dq)[0]
+    assert per_heat == pytest.approx((plus - minus) / (2.0 * dq), rel=1e-4, abs=1e-7)
+    plus = _step(duration_s, start_degc + dt, heat_w)[0]
+    minus = _step(duration_s, start_degc - dt, heat_w)[0]
+    # where the thermostat opens within dt of the start the derivative jumps
+    if abs(start_degc - THERMAL.thermostat_open_degc) > 2.0 * dt:
+        assert per_start == pytest.approx((plus - minus) / (2.0 * dt), abs=1e-4)
+
+
+@settings(max_examples=300, deadline=None)
+@given(duration_s=durations, start_degc=temperatures, heat_w=heats)
+def test_radiator_only_cools_and_more_heat_or_a_warmer_start_never_end_colder(
+    duration_s, start_degc, heat_w
+):
+    end, per_heat, per_start = _step(duration_s, start_degc, heat_w)
+    capacity = THERMAL.heat_capacity_j_per_k
+    assert end <= start_degc + duration_s * heat_w / capacity + 1e-9
+    assert 0.0 <= per_heat <= duration_s / capacity * (1.0 + 1e-9)
+    assert 0.0 <= per_start <= 1.0
+
+
+def test_chord_of_the_radiator_is_near_the_plant_and_above():
+    plant, slope = Plant(VEHICLE), radiator_w_per_k(THERMAL)
+    span = THERMAL.thermostat_span_k
+    for t in np.linspace(THERMAL.thermostat_open_degc, THERMAL.t_cl_max_degc, 21):
+        above = slope * (t - THERMAL.thermostat_open_degc) - plant.radiator_w(float(t))
+        assert -1e-6 <= above <= THERMAL.radiator_w_per_k * span / 4.0 + 1e-6
