@@ -80,7 +80,7 @@ class Planner:
             plan = self._solve(stages, soc, t_cl_degc, about, start, cold=True)
             if not plan.solution.usable:
                 return
-            about, start = self._linearisation(plan.x, t_cl_degc), (plan.x, plan.duals)
+            about, start = self.linearisation(plan.x, t_cl_degc), (plan.x, plan.duals)
         self.plan, self._plan_step, self._solves = plan, step, WARM_UP_STEPS
 
     def solve(self, step: int, soc: float, t_cl_degc: float) -> Plan:
@@ -97,7 +97,7 @@ class Planner:
             x, duals = self.plan.x, self.plan.duals
             for _ in range(step - self._plan_step):
                 x, duals = x[self._shift], duals[self._shift]
-            about, start = self._linearisation(x, t_cl_degc), (x, duals)
+            about, start = self.linearisation(x, t_cl_degc), (x, duals)
         plan = self._solve(stages, soc, t_cl_degc, about, start)
         if plan.solution.usable:
             self.plan, self._plan_step = plan, step
@@ -147,7 +147,7 @@ class Planner:
         )
 
     @staticmethod
-    def _linearisation(x: Floats, t_cl_degc: float) -> Linearisation:
+    def linearisation(x: Floats, t_cl_degc: float) -> Linearisation:
         """Mean coolant temperature and fuel rate of each stage of a solution."""
         end = x[:, Var.T_CL]
         mean = 0.5 * end
