@@ -49,8 +49,8 @@ class QpmpcRecorded(TestSet):  # type: ignore[misc]
                 for k in np.flatnonzero(data["solvable"]):
                     yield problem(data, int(k), f"{trip}: {data['names'][k]}")
             else:
-                for k in range(0, len(data["q"]), EVERY):
-                    yield problem(data, k, f"{trip}: step {k}")
+                for step in range(0, len(data["q"]), EVERY):
+                    yield problem(data, step, f"{trip}: step {step}")
 
 
 def problem(data: Mapping[str, Any], k: int, name: str) -> Problem:
