@@ -27,8 +27,8 @@ SOLVERS: tuple[Solver, ...] = ("admm", "osqp")
 MEMORY_KB: dict[tuple[Solver, Precision], tuple[int, int]] = {
     ("admm", "f32"): (128, 96),
     ("admm", "f64"): (128, 96),
-    ("osqp", "f32"): (256, 192),
-    ("osqp", "f64"): (256, 320),
+    ("osqp", "f32"): (256, 256),
+    ("osqp", "f64"): (512, 512),
 }
 
 Name = TypeVar("Name", bound=str)

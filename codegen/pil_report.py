@@ -1,16 +1,28 @@
-"""Table, CSV, JSON and picture of a processor-in-the-loop run."""
+"""Table, CSV, JSON, picture and HTML page of processor-in-the-loop runs."""
 
+from base64 import b64encode
+from collections.abc import Sequence
+from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
-import numpy as np
+from jinja2 import Environment, StrictUndefined
+from rich.table import Table
 
 from qpmpc.codegen.controller import FLAGS
+from qpmpc.codegen.pareto import Pareto
 from qpmpc.codegen.pil import PilResult
 from qpmpc.files import json_text, write_bytes, write_text
 from qpmpc.report.columns import violations_text
+from qpmpc.report.provenance import provenance
+from qpmpc.solvers.osqp import OsqpSettings
 
 FLIPS_SHOWN = 8
+SHOWN_CYCLES_AN_INSTRUCTION = 1.5
+NO_MATPLOTLIB = (
+    "no picture and no report: matplotlib is not installed (pip install 'qpmpc-iptm[plot]')"
+)
 
 
 def pil_lines(result: PilResult) -> list[str]:
@@ -55,15 +67,91 @@ def pil_lines(result: PilResult) -> list[str]:
 
 
 def write_pil(result: PilResult, folder: Path) -> list[str]:
-    """Write steps, figures and, with matplotlib, the picture; returns remarks."""
+    """Write steps, figures and, with matplotlib, picture and report; returns remarks."""
     solver = "" if result.solver == "admm" else f"_{result.solver}"
     stem = f"pil_{result.run.cycle}_{result.precision}{solver}"
     write_text(folder / f"{stem}.csv", _csv(result))
     write_text(folder / f"{stem}.json", json_text(result.summary()))
     if find_spec("matplotlib") is None:
-        return [f"{folder / stem}.csv, .json written; no picture: matplotlib is not installed"]
-    write_bytes(folder / f"{stem}.png", draw_pil(result))
-    return [f"{folder / stem}.csv, .json, .png written"]
+        return [f"{folder / stem}.csv, .json written; {NO_MATPLOTLIB}"]
+    from qpmpc.codegen.pil_pictures import draw_pil
+
+    picture = draw_pil(result)
+    write_bytes(folder / f"{stem}.png", picture)
+    write_text(folder / f"{stem}.html", _html(result, [result.summary()], picture))
+    return [f"{folder / stem}.csv, .json, .png, .html written"]
+
+
+def write_pareto(pareto: Pareto, folder: Path) -> list[str]:
+    """Write figures and, with matplotlib, picture and report; returns remarks.
+
+    The run shown in detail is the one whose iterations are nearest to the default.
+    """
+    data = pareto.as_data()
+    stem = f"pareto_{data['runs'][0]['cycle']}"
+    write_text(folder / f"{stem}.json", json_text(data))
+    if find_spec("matplotlib") is None:
+        return [f"{folder / stem}.json written; {NO_MATPLOTLIB}"]
+    from qpmpc.codegen.pil_pictures import draw_pareto, draw_pil
+
+    default = OsqpSettings().iterations
+    shown = min(pareto.results, key=lambda result: abs(result.iterations - default))
+    picture = draw_pareto(data["runs"])
+    write_bytes(folder / f"{stem}.png", picture)
+    page = _html(shown, data["runs"], draw_pil(shown), picture, pareto.dp_fuel_g)
+    write_text(folder / f"{stem}.html", page)
+    return [f"{folder / stem}.json, .png, .html written"]
+
+
+def pareto_table(rows: Sequence[dict[str, Any]]) -> Table:
+    """Return one line a run for the terminal."""
+    table = Table(title=f"{rows[0]['cycle']}: fuel against instructions on a Cortex-M7")
+    for name in ("solver", "precision"):
+        table.add_column(name)
+    for name in ("K", "instructions a step", "spread %", "flash B", "RAM B", "above DP %"):
+        table.add_column(name, justify="right")
+    table.add_column("remark")
+    for row in rows:
+        remarks = [f"{key} exceeded" for key, value in row["violations"].items() if value > 0]
+        remarks += [f"fallback {row['fallback_steps']} s"] if row["fallback_steps"] else []
+        flips = len(row["on_off_flips"])
+        remarks += [f"on/off differs from Python in {flips} steps"] if flips else []
+        table.add_row(
+            row["solver"],
+            row["precision"],
+            f"{row['iterations']}",
+            f"{row['instructions']['median']:,}",
+            f"{row['instructions']['spread_percent']:.3f}",
+            f"{row['flash_bytes']:,}",
+            f"{row['ram_bytes']:,}",
+            f"{row['fuel_above_dp_percent']:.2f}",
+            ", ".join(remarks),
+        )
+    return table
+
+
+def _html(
+    shown: PilResult,
+    rows: Sequence[dict[str, Any]],
+    run_picture: bytes,
+    pareto_picture: bytes = b"",
+    dp_fuel_g: float = 0.0,
+) -> str:
+    """Return the report: one page that needs no other file."""
+    times = rows[0]["milliseconds_estimated"]
+    template = files("qpmpc.codegen").joinpath("pil.html.j2").read_text("utf-8")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    return environment.from_string(template).render(
+        cycle=shown.run.cycle,
+        vehicle=shown.run.vehicle,
+        rows=rows,
+        times=[t for t in times if t["cycles_per_instruction"] == SHOWN_CYCLES_AN_INSTRUCTION],
+        lines=pil_lines(shown),
+        run_picture=b64encode(run_picture).decode(),
+        pareto_picture=b64encode(pareto_picture).decode(),
+        dp_fuel_g=dp_fuel_g,
+        provenance=provenance(),
+    )
 
 
 def _csv(result: PilResult) -> str:
@@ -76,52 +164,3 @@ def _csv(result: PilResult) -> str:
             f"{result.reference_w[k]:.6g},{status}"
         )
     return "\n".join(lines) + "\n"
-
-
-def draw_pil(result: PilResult) -> bytes:
-    """Draw instructions a step, engine power and command error over time.
-
-    Returns
-    -------
-    PNG
-    """
-    from matplotlib.figure import Figure
-
-    from qpmpc.report.style import BLACK, BLUE, GREY, VERMILION, png, tidy
-
-    figure = Figure(figsize=(9.0, 6.0), layout="constrained")
-    counts, power, error = figure.subplots(3, 1, sharex=True)
-    time_s = np.arange(len(result.instructions))
-    counts.plot(time_s, result.instructions / 1e6, color=BLUE, linewidth=0.9)
-    counts.set_ylim(bottom=0.0)
-    counts.set_ylabel("instructions\nmillions a step")
-    power.plot(time_s, result.reference_w / 1e3, color=GREY, linewidth=1.6, label="Python f64")
-    power.plot(
-        time_s, result.command_w / 1e3, color=VERMILION, linewidth=0.8, label=result.precision
-    )
-    power.set_ylabel("engine power\nkW")
-    power.legend(fontsize=8, frameon=False)
-    least = 1e-3
-    error.semilogy(
-        time_s, np.maximum(result.command_error_w, least), ".", color=BLACK, markersize=3
-    )
-    flips = result.flips
-    error.semilogy(
-        flips,
-        np.maximum(result.command_error_w[flips], least),
-        "o",
-        color=VERMILION,
-        markersize=5,
-        label="engine on in one, off in the other",
-    )
-    error.set_ylabel(f"command error\nW (at least {least:g} shown)")
-    error.legend(fontsize=8, frameon=False)
-    error.set_xlabel("time, s")
-    for axes in (counts, power, error):
-        tidy(axes)
-    figure.suptitle(
-        f"{result.run.cycle}: controller on {result.target} in QEMU, {result.precision}, "
-        f"solver {result.solver}",
-        fontsize=11,
-    )
-    return png(figure)

@@ -44,7 +44,7 @@ def help_texts(names: Container[str]) -> list[str]:
 ALL_NAMES = [command.callback.__name__ for command in app.registered_commands]
 EXAMPLES = commands_in(
     [text for _, text in blocks("sh")]
-    + help_texts(["simulate", "compare", "cycles", "vehicles"])  # other commands take minutes
+    + help_texts(["simulate", "compare", "codegen", "cycles", "vehicles"])  # others take minutes
 )
 
 

@@ -1,16 +1,20 @@
-"""Three renderings of one QP, shown equal: numpy, cvxpy, and CasADi by differentiation."""
+"""One QP in four renderings, shown equal: numpy, cvxpy, CasADi by differentiation, generated C."""
 
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from qpmpc.codegen.controller import InputBuilder
+from qpmpc.codegen.host_library import compiler
+from qpmpc.codegen.values import values_of
 from qpmpc.controllers.factory import ControllerSettings
-from qpmpc.controllers.mh_qp import MhQp
 from qpmpc.cycles import Cycle
+from qpmpc.errors import QpmpcError
 from qpmpc.preview.forecast import Trace
 from qpmpc.preview.stages import StageBuilder, Stages
 from qpmpc.pwa.model import PwaModel
@@ -18,131 +22,131 @@ from qpmpc.qp.cvxpy_twin import CvxpyTwin
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.stage_qp import QpData, StageQp
 from qpmpc.qp.structure import VARS, Var
-from qpmpc.simulate import simulate
 from qpmpc.solvers.base import Status
 from qpmpc.solvers.piqp import Piqp
 from qpmpc.solvers.timed import require
 from qpmpc.vehicle.parameters import Vehicle
-from qpmpc.vehicle.plant import Plant
 from qpmpc.verification.casadi_qp import CasadiQp
 from qpmpc.verification.cvxpy_matrices import cvxpy_matrices
+from qpmpc.verification.generated_qp import GeneratedQp
 from qpmpc.verification.matrices import Matrices, difference, matrices_of
+from qpmpc.verification.qp_cases import QpCase, random_cases, recorded_cases
 
 Floats = NDArray[np.float64]
 
-EXACT = 1e-10  # tolerance of the product's QP, solved by PIQP
-CVXPY_OPTIONS = {"eps_abs": 1e-9, "eps_rel": 1e-9}  # of PIQP, in cvxpy's units: grams
-DAQP_OPTIONS = {"primal_tol": 1e-9, "dual_tol": 1e-9, "iter_limit": 10_000}
-PROXIMAL_WEIGHTS = (1e-4, 1e-3, 1e-2)  # the next where DAQP cycles with one; same optimum
-EQUALITY = 5  # DAQP's name for it
-# T^, F^, E^, T at start and end of a random case
-RANDOM_ABOUT = ((20.0, 90.0), (0.0, 3.0), (0.0, 40e3), (20.0, 90.0), (20.0, 90.0))
+EXACT = 1e-10  # tolerance of the product's QP, solved by PIQP, and of CasADi's, by QOCO
+CLARABEL_OPTIONS = {  # cvxpy's, in its units: grams. Its default regularisation costs digits
+    "tol_gap_abs": 1e-9,
+    "tol_gap_rel": 1e-9,
+    "tol_feas": 1e-9,
+    "static_regularization_constant": 1e-10,
+    "iterative_refinement_max_iter": 50,
+    "iterative_refinement_abstol": 1e-14,
+    "iterative_refinement_reltol": 1e-14,
+}
+C_TOLERANCE = 3e-8  # operator splitting: the last digits take as long as all before
+C_RHO = 0.005  # measured: a fifth of the iterations to the end that the product's own rho takes
 
 
 @dataclass(frozen=True)
-class QpCase:
-    """What one QP is made from.
+class Difference:
+    """Difference of one rendering from the product's own QP.
 
     Attributes
     ----------
-    stages : the road ahead
-    soc, t_cl_degc : state
-    about : linearisation point
+    matrices : largest difference of an entry, see `matrices.difference`
+    optimum : |J - J*| / (1 + |J*|) of its optimum, J* by PIQP on the product's matrices
+    violation : of the product's rows by that optimum, in solver units
     """
 
-    stages: Stages
-    soc: float
-    t_cl_degc: float
-    about: Linearisation
-
-
-@dataclass(frozen=True)
-class CaseDifference:
-    """Differences of one case, each against the product's own QP.
-
-    Attributes
-    ----------
-    cvxpy_matrices, casadi_matrices : largest difference of an entry, see `matrices.difference`
-    cvxpy_optimum, casadi_optimum : |J - J*| / (1 + |J*|) of their optima, J* by PIQP on the
-        product's matrices: cvxpy calls PIQP on what it compiles, CasADi's matrices go to DAQP, an
-        active-set method
-    cvxpy_violation, casadi_violation : of the product's rows by those results, in solver units
-    """
-
-    cvxpy_matrices: float
-    casadi_matrices: float
-    cvxpy_optimum: float
-    casadi_optimum: float
-    cvxpy_violation: float
-    casadi_violation: float
+    matrices: float
+    optimum: float
+    violation: float
 
 
 @dataclass(frozen=True)
 class Equivalence:
-    """Differences over many cases."""
+    """Differences over many cases, a dictionary a case: by rendering."""
 
-    cases: list[CaseDifference]
+    cases: list[dict[str, Difference]]
 
-    def worst(self) -> CaseDifference:
-        """Return the largest of each difference."""
-        rows = np.array([list(asdict(case).values()) for case in self.cases])
-        return CaseDifference(*rows.max(axis=0).tolist())
+    def worst(self) -> dict[str, Difference]:
+        """Return the largest of each difference; nan where any is nan."""
+        return {
+            name: Difference(
+                *np.max([list(asdict(case[name]).values()) for case in self.cases], axis=0).tolist()
+            )
+            for name in self.cases[0]
+        }
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, ready for JSON."""
-        return {"cases": len(self.cases), "worst": asdict(self.worst())}
+        worst = {name: asdict(found) for name, found in self.worst().items()}
+        return {"cases": len(self.cases), "worst": worst}
 
 
 class Renderings:
-    """The QP of one trip in its three renderings.
+    """The QP of one trip in its renderings: `cvxpy`, `casadi` and, with a C compiler, `c`.
+
+    Each has a solver of its own: cvxpy calls Clarabel on what it compiles, CasADi's matrices go to
+    QOCO, the generated C iterates to the end, and the product's matrices go to PIQP.
 
     Parameters
     ----------
     vehicle : plant parameters
-    preview : cuts the trip into stages
+    truth : the trip
     settings : of all controllers; those of `mh_qp` count
 
     Raises
     ------
     QpmpcError
-        If CasADi, PIQP or DAQP is not installed.
+        If CasADi, Clarabel, PIQP or QOCO is not installed.
     """
 
-    def __init__(
-        self, vehicle: Vehicle, preview: StageBuilder, settings: ControllerSettings
-    ) -> None:
+    def __init__(self, vehicle: Vehicle, truth: Trace, settings: ControllerSettings) -> None:
         chosen = settings.mh_qp
         model = PwaModel.of(vehicle, chosen.pwa)
-        self.qp = StageQp(vehicle, model, preview.count, chosen.qp, chosen.scaling)
-        self.twin = CvxpyTwin(vehicle, model, preview.count, chosen.qp)
-        self.casadi = CasadiQp(vehicle, model, preview.count, chosen.qp)
+        self.preview = StageBuilder(vehicle, truth, truth, chosen.horizon)
+        stages = self.preview.count
+        self.qp = StageQp(vehicle, model, stages, chosen.qp, chosen.scaling)
+        self.twin = CvxpyTwin(vehicle, model, stages, chosen.qp)
+        self.casadi = CasadiQp(vehicle, model, stages, chosen.qp)
+        self.generated: GeneratedQp | None = None
+        if compiler() is not None:
+            blocks = chosen.horizon.block_count(truth.steps)
+            to_the_end = settings.with_settings({"mh_qp.osqp.rho": C_RHO})
+            values = values_of(vehicle, to_the_end.mh_qp, settings.rule_based, blocks)
+            self.generated = GeneratedQp(values, InputBuilder(self.preview, truth))
         self._solver = Piqp(EXACT)
         self._is_set_up = False
 
-    def compare(self, case: QpCase) -> CaseDifference:
+    def inputs(self, case: QpCase) -> tuple[Stages, float, float, Linearisation]:
+        """Return what the renderings in Python are updated with."""
+        seen = case.seen
+        about = Linearisation.about(case.x, seen.t_cl_degc, self.preview.settings)
+        return self.preview.at(seen.step), seen.soc, seen.t_cl_degc, about
+
+    def compare(self, case: QpCase) -> dict[str, Difference]:
         """Build and solve one case in all renderings."""
-        data = self.qp.update(case.stages, case.soc, case.t_cl_degc, case.about)
+        data = self.qp.update(*self.inputs(case))
         column = data.scaling.column
         ours = matrices_of(self.qp.structure, data)
         best = ours.value(data.scaling.primal(self._solve(data)))
-
-        self.twin.update(case.stages, case.soc, case.t_cl_degc, case.about, data.scaling)
-        with warnings.catch_warnings(action="ignore"):  # how accurate it is, is measured below
-            by_cvxpy = self.twin.solve("PIQP", **CVXPY_OPTIONS).ravel()
-
-        weight = np.sqrt(self.qp.settings.regularisation / data.scaling.cost)
-        smoothing = (weight / column).reshape(-1, VARS)
-        smoothing[:, [Var.SOC, Var.T_CL]] = 0.0
-        theirs = self.casadi.matrices(case.stages, case.soc, case.t_cl_degc, case.about, smoothing)
-        by_casadi = self._solve_dense(theirs, column, data.scaling.cost)
-        return CaseDifference(
-            cvxpy_matrices=difference(ours, cvxpy_matrices(self.twin), column),
-            casadi_matrices=difference(ours, theirs, column),
-            cvxpy_optimum=abs(ours.value(by_cvxpy) - best) / (1.0 + abs(best)),
-            casadi_optimum=abs(ours.value(by_casadi) - best) / (1.0 + abs(best)),
-            cvxpy_violation=ours.violation(by_cvxpy, column),
-            casadi_violation=ours.violation(by_casadi, column),
-        )
+        made: dict[str, Callable[[QpCase, QpData], tuple[Matrices, Floats]]] = {
+            "cvxpy": self._by_cvxpy,
+            "casadi": self._by_casadi,
+        }
+        if self.generated is not None:
+            made["c"] = self._by_c
+        found = {}
+        for name, make in made.items():
+            theirs, x = make(case, data)
+            found[name] = Difference(
+                matrices=difference(ours, theirs, column),
+                optimum=abs(ours.value(x) - best) / (1.0 + abs(best)),
+                violation=ours.violation(x, column),
+            )
+        return found
 
     def _solve(self, data: QpData) -> Floats:
         if not self._is_set_up:
@@ -151,60 +155,51 @@ class Renderings:
         solution = self._solver.solve(data, None, None)
         return solution.z if solution.status is Status.SOLVED else np.full_like(data.q, np.nan)
 
-    def _solve_dense(self, m: Matrices, column: Floats, cost: float) -> Floats:
-        """Optimum by DAQP, in units that make its tolerances mean the same as the product's."""
-        rows = np.vstack([m.equal, m.upper]) * column
-        norm = np.linalg.norm(rows, axis=1)
-        high = np.concatenate([m.equal_to, m.upper_to]) / norm
-        is_equal = np.arange(len(high)) < len(m.equal_to)
-        solve = require("daqp", "daqp").solve
-        for weight in PROXIMAL_WEIGHTS:
-            z, _, flag, _ = solve(
-                cost * m.hessian * np.multiply.outer(column, column),
-                cost * m.gradient * column,
-                rows / norm[:, None],
-                high,
-                np.where(is_equal, high, -np.inf),
-                np.where(is_equal, EQUALITY, 0).astype(np.int32),
-                eps_prox=weight,
-                **DAQP_OPTIONS,
-            )
-            if flag > 0:
-                return np.array(z) * column
-        return np.full_like(column, np.nan)
+    def _by_cvxpy(self, case: QpCase, data: QpData) -> tuple[Matrices, Floats]:
+        self.twin.update(*self.inputs(case), data.scaling)
+        matrices = cvxpy_matrices(self.twin)
+        with warnings.catch_warnings(action="ignore"):  # how accurate it is, is measured
+            try:
+                return matrices, self.twin.solve("CLARABEL", **CLARABEL_OPTIONS).ravel()
+            except QpmpcError:
+                return matrices, np.full_like(data.q, np.nan)
+
+    def _by_casadi(self, case: QpCase, data: QpData) -> tuple[Matrices, Floats]:
+        column, cost = data.scaling.column, data.scaling.cost
+        weight = np.sqrt(self.qp.settings.regularisation / cost)
+        smoothing = (weight / column).reshape(-1, VARS)
+        smoothing[:, [Var.SOC, Var.T_CL]] = 0.0
+        matrices = self.casadi.matrices(*self.inputs(case), smoothing)
+        return matrices, _by_qoco(matrices, column, cost)
+
+    def _by_c(self, case: QpCase, _: QpData) -> tuple[Matrices, Floats]:
+        assert self.generated is not None
+        matrices = self.generated.update(case.seen, case.x)
+        return matrices, self.generated.solve(C_TOLERANCE)
 
 
-def recorded_cases(
-    cycle: Cycle, vehicle: Vehicle, preview: StageBuilder, settings: ControllerSettings, every: int
-) -> Iterator[QpCase]:
-    """Cases met by `mh-qp` on the road: each `every`-th step, about the plan of the step before."""
-    plant, truth = Plant(vehicle), Trace.of(cycle, vehicle)
-    driver = MhQp("mh-qp", plant, truth, truth, settings.mh_qp, settings.rule_based)
-    run = simulate(cycle, driver, vehicle).trajectory
-    again = MhQp("mh-qp", plant, truth, truth, settings.mh_qp, settings.rule_based)
-    for step in range(cycle.steps):
-        soc, t_cl_degc = float(run.soc[step]), float(run.t_cl_degc[step])
-        x = again.planner.solve(step, soc, t_cl_degc).x
-        if step % every == 0:
-            about = Linearisation.about(x, t_cl_degc, preview.settings)
-            yield QpCase(preview.at(step), soc, t_cl_degc, about)
-
-
-def random_cases(
-    preview: StageBuilder, vehicle: Vehicle, count: int, seed: int
-) -> Iterator[QpCase]:
-    """Cases that no trip may ever meet: any step, any state, any linearisation point."""
-    rng = np.random.default_rng(seed)
-    battery = vehicle.battery
-    for _ in range(count):
-        yield QpCase(
-            stages=preview.at(int(rng.integers(preview.steps))),
-            soc=float(rng.uniform(battery.soc_min, battery.soc_max)),
-            t_cl_degc=float(rng.uniform(20.0, 90.0)),
-            about=Linearisation(
-                *(rng.uniform(low, high, preview.count) for low, high in RANDOM_ABOUT)
-            ),
-        )
+def _by_qoco(m: Matrices, column: Floats, cost: float) -> Floats:
+    """Optimum by QOCO, in units that make its tolerances mean the same as the product's."""
+    equal, upper = m.equal * column, m.upper * column
+    equal_norm, upper_norm = np.linalg.norm(equal, axis=1), np.linalg.norm(upper, axis=1)
+    solver = require("qoco", "qoco").QOCO()
+    solver.setup(
+        n=len(column),
+        m=len(upper),
+        p=len(equal),
+        P=sp.csc_matrix(np.triu(cost * m.hessian * np.multiply.outer(column, column))),
+        c=cost * m.gradient * column,
+        A=sp.csc_matrix(equal / equal_norm[:, None]),
+        b=m.equal_to / equal_norm,
+        G=sp.csc_matrix(upper / upper_norm[:, None]),
+        h=m.upper_to / upper_norm,
+        l=len(upper),
+        nsoc=0,
+        q=None,
+        abstol=EXACT,
+        reltol=EXACT,
+    )
+    return np.array(solver.solve().x) * column
 
 
 def check_equivalence(
@@ -227,14 +222,13 @@ def check_equivalence(
     Raises
     ------
     QpmpcError
-        If CasADi is not installed.
+        If CasADi or a solver is not installed.
     """
     chosen = settings or ControllerSettings()
     truth = Trace.of(cycle, vehicle)
-    preview = StageBuilder(vehicle, truth, truth, chosen.mh_qp.horizon)
-    renderings = Renderings(vehicle, preview, chosen)
-    cases: Iterable[QpCase] = [
-        *recorded_cases(cycle, vehicle, preview, chosen, every),
-        *random_cases(preview, vehicle, random, seed),
+    renderings = Renderings(vehicle, truth, chosen)
+    cases = [
+        *recorded_cases(cycle, vehicle, chosen, every),
+        *random_cases(truth, vehicle, renderings.preview.count, random, seed),
     ]
     return Equivalence([renderings.compare(case) for case in cases])

@@ -39,15 +39,26 @@ class Matrices:
 
 
 def matrices_of(structure: QpStructure, data: QpData) -> Matrices:
-    """Undo the scaling of the product's QP, and give each side of a row its own row."""
+    """Undo the scaling of the product's QP."""
     scaling = data.scaling
-    a = structure.matrix_of(data.a_data).toarray() / scaling.row[:, None] / scaling.column
-    lower, upper = data.lower / scaling.row, data.upper / scaling.row
+    return matrices_from(
+        structure.matrix_of(data.a_data).toarray() / scaling.row[:, None] / scaling.column,
+        data.lower / scaling.row,
+        data.upper / scaling.row,
+        data.hessian / scaling.column**2 / scaling.cost,
+        data.q / scaling.column / scaling.cost,
+    )
+
+
+def matrices_from(
+    a: Floats, lower: Floats, upper: Floats, curvature: Floats, gradient: Floats
+) -> Matrices:
+    """Give each side of the rows lower <= a x <= upper its own row; curvature: diagonal of P."""
     equal = lower == upper
     above, below = ~equal & np.isfinite(upper), ~equal & np.isfinite(lower)
     return Matrices(
-        gradient=data.q / scaling.column / scaling.cost,
-        hessian=np.diag(data.hessian / scaling.column**2 / scaling.cost),
+        gradient=gradient,
+        hessian=np.diag(curvature),
         equal=a[equal],
         equal_to=lower[equal],
         upper=np.concatenate([a[above], -a[below]]),

@@ -215,9 +215,10 @@ def compare(cycles: Iterable[Cycle], vehicle: Vehicle, every: int = 5) -> NlpCom
 
 
 def _spread(differences: Floats) -> dict[str, float]:
-    """Median, 95th percentile and largest of the absolute differences."""
+    """Mean, median, 95th percentile and largest of the absolute differences."""
     size = np.abs(differences)
     return {
+        "mean": float(size.mean()),
         "median": float(np.median(size)),
         "p95": float(np.percentile(size, 95)),
         "max": float(size.max()),

@@ -17,7 +17,8 @@ def benchmark(
 ) -> None:
     """Let solvers and settings drive whole cycles: fuel above DP against time a step.
 
-    With --out: pictures, figures, the recorded QPs (npz) and an HTML report.
+    With --out: pictures, figures and an HTML report; the recorded QPs (npz), and
+    qpmpc_recorded.py, which makes them a test set for qpbenchmark.
 
     For example:
 
@@ -28,7 +29,6 @@ def benchmark(
     from qpmpc.cli.console import progress_bar, result_console, write_json
     from qpmpc.cli.inputs import check_outputs, load_vehicle_and_settings
     from qpmpc.cycles import load_cycle
-    from qpmpc.files import write_bytes
     from qpmpc.verification.benchmark.benchmark import benchmark as run
     from qpmpc.verification.benchmark.candidates import candidates
     from qpmpc.verification.benchmark.table import benchmark_table
@@ -45,11 +45,11 @@ def benchmark(
     console = result_console(json_file)
     console.print(benchmark_table(result.rows))
     if out is not None:
-        from qpmpc.verification.benchmark.export import recorded_npz
+        from qpmpc.verification.benchmark.export import write_qps
         from qpmpc.verification.benchmark.report import write_benchmark
+        from qpmpc.verification.problem_set import problem_set
         from qpmpc.verification.recorder import record
 
         write_benchmark(result, car, out)
-        for trip in trips:
-            write_bytes(out / f"qps_{trip.name}.npz", recorded_npz(record(trip, car)))
-        console.print(f"{out / 'benchmark.html'} written, with pictures, JSON and recorded QPs")
+        write_qps([record(trip, car) for trip in trips], problem_set(car), out)
+        console.print(f"{out / 'benchmark.html'} written, with pictures, JSON and QPs")

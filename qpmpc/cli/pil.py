@@ -1,17 +1,42 @@
 """``qpmpc pil``: the generated firmware drives a cycle, instruction by instruction."""
 
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from qpmpc.cli.options import CycleArgument, JsonOption, OutOption, SetOption, VehicleOption
 
+if TYPE_CHECKING:
+    from qpmpc.codegen.generate import Precision, Solver
+    from qpmpc.controllers.factory import ControllerSettings
+    from qpmpc.cycles import Cycle
+    from qpmpc.vehicle import Vehicle
+
 
 def pil(
     cycle: CycleArgument,
     target: Annotated[str, typer.Option(metavar="TARGET", help="cortex-m7.")] = "cortex-m7",
-    precision: Annotated[str, typer.Option(metavar="f32|f64", help="Of all arithmetic.")] = "f32",
-    solver: Annotated[str, typer.Option(metavar="admm|osqp", help="Of the firmware.")] = "admm",
+    precision: Annotated[
+        str | None,
+        typer.Option(
+            metavar="f32|f64", help="Of all arithmetic; f32 if not named.", show_default=False
+        ),
+    ] = None,
+    solver: Annotated[
+        str | None,
+        typer.Option(
+            metavar="admm|osqp", help="Of the firmware; admm if not named.", show_default=False
+        ),
+    ] = None,
+    pareto: Annotated[
+        bool,
+        typer.Option(
+            "--pareto",
+            help="K = 10, 25, 50, 100 with both precisions and solvers, or those named: "
+            "instructions and memory against fuel above DP.",
+        ),
+    ] = False,
     vehicle: VehicleOption = "prius-nimh",
     set_: SetOption = None,
     json_file: JsonOption = None,
@@ -21,34 +46,80 @@ def pil(
 
     Instructions are counted on the target and exact; milliseconds are estimates. Every command is
     compared with the Python controller's in the same state. With --out: steps (CSV), figures
-    (JSON), picture (PNG).
+    (JSON), picture (PNG), report (HTML).
 
     For example:
 
       qpmpc pil nycc
 
       qpmpc pil nedc-truncated --set mh_qp.osqp.iterations=25 --out results/pil
+
+      qpmpc pil nycc --pareto --out results/pil
     """
-    from qpmpc.cli.console import progress_bar, result_console, write_json
     from qpmpc.cli.inputs import check_outputs, load_vehicle_and_settings
+    from qpmpc.codegen.firmware import require_tools
     from qpmpc.codegen.generate import PRECISIONS, SOLVERS, one_of
-    from qpmpc.codegen.pil import processor_in_the_loop
-    from qpmpc.codegen.pil_report import pil_lines, write_pil
     from qpmpc.cycles import load_cycle
+    from qpmpc.runners import check_names
 
     one_of(target, ("cortex-m7",), "target")
-    chosen = one_of(precision, PRECISIONS, "precision")
-    of_solver = one_of(solver, SOLVERS, "solver")
+    precisions = PRECISIONS if precision is None else (one_of(precision, PRECISIONS, "precision"),)
+    solvers = SOLVERS if solver is None else (one_of(solver, SOLVERS, "solver"),)
     car, settings = load_vehicle_and_settings(vehicle, set_)
     trip = load_cycle(cycle)
     check_outputs(json_file, out)
+    if pareto:
+        check_names(["dp"])
+    require_tools()
+    if pareto:
+        _pareto(trip, car, settings, precisions, solvers, json_file, out)
+    else:
+        _one_run(trip, car, settings, precisions[0], solvers[0], json_file, out)
+
+
+def _one_run(
+    trip: "Cycle",
+    car: "Vehicle",
+    settings: "ControllerSettings",
+    precision: "Precision",
+    solver: "Solver",
+    json_file: Path | None,
+    out: Path | None,
+) -> None:
+    from qpmpc.cli.console import progress_bar, result_console, write_json
+    from qpmpc.codegen.pil import processor_in_the_loop
+    from qpmpc.codegen.pil_report import pil_lines, write_pil
+
     with progress_bar(1) as bar:
         report = bar.next_job(f"{trip.name}, firmware {solver} {precision}")
-        result = processor_in_the_loop(trip, car, settings, chosen, report, of_solver)
+        result = processor_in_the_loop(trip, car, settings, precision, report, solver)
     write_json(result.summary(), json_file)
     console = result_console(json_file)
     for line in pil_lines(result):
         console.print(line, markup=False)
     if out is not None:
         for remark in write_pil(result, out):
+            console.print(remark, markup=False)
+
+
+def _pareto(
+    trip: "Cycle",
+    car: "Vehicle",
+    settings: "ControllerSettings",
+    precisions: "tuple[Precision, ...]",
+    solvers: "tuple[Solver, ...]",
+    json_file: Path | None,
+    out: Path | None,
+) -> None:
+    from qpmpc.cli.console import progress_bar, result_console, write_json
+    from qpmpc.codegen.pareto import ITERATIONS, embedded_pareto, job_count
+    from qpmpc.codegen.pil_report import pareto_table, write_pareto
+
+    with progress_bar(job_count(precisions, solvers, ITERATIONS)) as bar:
+        found = embedded_pareto(trip, car, settings, precisions, solvers, bar.next_job)
+    write_json(found.as_data(), json_file)
+    console = result_console(json_file)
+    console.print(pareto_table(found.rows()))
+    if out is not None:
+        for remark in write_pareto(found, out):
             console.print(remark, markup=False)

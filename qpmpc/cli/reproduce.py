@@ -44,9 +44,7 @@ def reproduce(
     check_outputs(json_file, out)
     check_names(["dp"])
     if find_spec("matplotlib") is None:
-        raise InputError(
-            "reproduce needs matplotlib: pip install 'qpmpc-iptm[plot,verification]'"
-        )
+        raise InputError("reproduce needs matplotlib: pip install 'qpmpc-iptm[plot,verification]'")
     from qpmpc.verification.reproduce.report import study_data, write_report
 
     extent = Extent.quick() if quick else Extent.full()

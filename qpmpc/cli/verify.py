@@ -7,7 +7,7 @@ import typer
 
 from qpmpc.cli.options import JsonOption, OutOption
 
-NEEDED = ("clarabel", "daqp", "numba", "piqp", "qoco")
+NEEDED = ("casadi", "clarabel", "daqp", "numba", "piqp", "qoco")
 
 
 def verify(

@@ -33,6 +33,8 @@ class OsqpSettings(BaseModel):
     iterations : K, iterations a step
     cold_iterations : iterations of a solve without warm start, at departure
     rho, sigma, relaxation : ADMM's step size, proximal weight and over-relaxation
+    status_tolerance : on the residuals, absolute and relative, for the result to be called solved;
+        what comes of a step that is not, is used all the same
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -42,6 +44,7 @@ class OsqpSettings(BaseModel):
     rho: Positive = 0.1
     sigma: Positive = 1e-6
     relaxation: Annotated[float, Field(gt=0.0, lt=2.0)] = 1.6
+    status_tolerance: Annotated[float, Field(gt=0.0, lt=1.0)] = 1e-3
 
 
 class Osqp:
@@ -76,6 +79,8 @@ class Osqp:
             rho=self.settings.rho,
             sigma=self.settings.sigma,
             alpha=self.settings.relaxation,
+            eps_abs=self.settings.status_tolerance,
+            eps_rel=self.settings.status_tolerance,
         )
 
     def solve(

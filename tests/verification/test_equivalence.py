@@ -1,29 +1,32 @@
-"""Three renderings of the QP are one, and every way of telling them apart works."""
+"""Four renderings of the QP are one, and every way of telling them apart works."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import qpmpc.verification.equivalence
+from qpmpc.codegen.host_library import compiler
 from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.controllers.mh_qp import MhQp
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.errors import QpmpcError
-from qpmpc.preview import StageBuilder, Trace
+from qpmpc.preview import Trace
 from qpmpc.qp import CvxpyTwin, Var
-from qpmpc.vehicle import Vehicle, load_vehicle
+from qpmpc.simulate import simulate
+from qpmpc.vehicle import Plant, Vehicle, load_vehicle
 from qpmpc.verification.cvxpy_matrices import cvxpy_matrices
-from qpmpc.verification.equivalence import (
-    QpCase,
-    Renderings,
-    check_equivalence,
-    random_cases,
-    recorded_cases,
-)
+from qpmpc.verification.equivalence import Renderings, check_equivalence
+from qpmpc.verification.generated_qp import READ
 from qpmpc.verification.matrices import Matrices, difference, matrices_of
+from qpmpc.verification.qp_cases import QpCase, random_cases, recorded_cases
+from qpmpc.verification.recorder import RecordingSolver
 
 VEHICLE = load_vehicle()
 ROUNDING = 1e-12
 OPTIMUM = 1e-6
+ALL = {"cvxpy", "casadi"} | ({"c"} if compiler() is not None else set())
 
 
 def beginning(name: str, steps: int) -> Cycle:
@@ -39,29 +42,48 @@ def made(
     settings = ControllerSettings().with_settings(changes or {})
     cycle = beginning("udds", 250)
     truth = Trace.of(cycle, vehicle)
-    preview = StageBuilder(vehicle, truth, truth, settings.mh_qp.horizon)
-    departure = next(recorded_cases(cycle, vehicle, preview, settings, every=250))
-    cases = [departure, *random_cases(preview, vehicle, 2, 7)]
-    return Renderings(vehicle, preview, settings), cases
+    renderings = Renderings(vehicle, truth, settings)
+    departure = next(recorded_cases(cycle, vehicle, settings, every=250))
+    stages = renderings.preview.count
+    return renderings, [departure, *random_cases(truth, vehicle, stages, 2, 7)]
 
 
 def assert_equal(renderings: Renderings, case: QpCase) -> None:
     found = renderings.compare(case)
-    assert found.cvxpy_matrices < ROUNDING
-    assert found.casadi_matrices < ROUNDING
-    assert found.cvxpy_optimum < OPTIMUM
-    assert found.casadi_optimum < OPTIMUM
-    assert found.cvxpy_violation < OPTIMUM
-    assert found.casadi_violation < OPTIMUM
+    assert set(found) == ALL
+    for name, off in found.items():
+        assert off.matrices < ROUNDING, name
+        assert off.optimum < OPTIMUM, name
+        assert off.violation < OPTIMUM, name
 
 
 def test_recorded_and_random_cases() -> None:
     equivalence = check_equivalence(beginning("nycc", 150), VEHICLE, every=15, random=14)
     assert equivalence.to_dict()["cases"] == 24
     worst = equivalence.worst()
-    assert max(worst.cvxpy_matrices, worst.casadi_matrices) < ROUNDING
-    assert max(worst.cvxpy_optimum, worst.casadi_optimum) < OPTIMUM
-    assert max(worst.cvxpy_violation, worst.casadi_violation) < OPTIMUM
+    assert set(worst) == ALL
+    for name, off in worst.items():
+        assert off.matrices < ROUNDING, name
+        assert max(off.optimum, off.violation) < OPTIMUM, name
+
+
+def test_recorded_cases_are_the_qps_of_the_road() -> None:
+    """Made again from state and plan, they are bit for bit what `mh-qp` gave its solver."""
+    cycle, settings = beginning("nycc", 60), ControllerSettings()
+    plant, truth = Plant(VEHICLE), Trace.of(cycle, VEHICLE)
+    recorder = RecordingSolver(qpmpc.solvers.Osqp(settings.mh_qp.osqp))
+    driver = MhQp(
+        "mh-qp", plant, truth, truth, settings.mh_qp, settings.rule_based, solver=recorder
+    )
+    simulate(cycle, driver, VEHICLE)
+    solved = [qp.data for qp in recorder.qps[-cycle.steps :]]
+    renderings = Renderings(VEHICLE, truth, settings)
+    cases = list(recorded_cases(cycle, VEHICLE, settings, every=7))
+    assert [case.seen.step for case in cases] == list(range(0, 60, 7))
+    for case in cases:
+        data, theirs = renderings.qp.update(*renderings.inputs(case)), solved[case.seen.step]
+        for part in ("q", "a_data", "lower", "upper"):
+            np.testing.assert_array_equal(getattr(data, part), getattr(theirs, part))
 
 
 @pytest.mark.parametrize(
@@ -81,15 +103,58 @@ def test_other_settings(vehicle_changes: dict[str, object], changes: dict[str, o
         assert_equal(renderings, case)
 
 
+@pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+@pytest.mark.parametrize(
+    ("file", "old", "new", "part"),
+    [
+        ("mpc_admm.c", "(a->p_min[1] * x[VAR_ON])", "x[VAR_ON]", "matrices"),
+        ("mpc_admm.c", "b->t_max_high", "UNLIMITED", "matrices"),
+        ("mpc_qp.c", "stage->q[VAR_SLACK] = mpc_par", "stage->q[VAR_SLACK] = -mpc_par", "matrices"),
+        # the solver's own work: the matrix is right, what is found with it is not
+        ("mpc_admm.c", "f_f += entry[0] * entry[0];", "", "optimum"),
+    ],
+)
+def test_c_that_differs_is_noticed(monkeypatch, file, old, new, part) -> None:
+    project_files = qpmpc.verification.generated_qp.project_files
+
+    def spoilt(*arguments: object) -> dict[str, str]:
+        files = project_files(*arguments)
+        assert files[file].count(old) >= 1
+        files[file] = files[file].replace(old, new, 1)
+        return files
+
+    monkeypatch.setattr(qpmpc.verification.generated_qp, "project_files", spoilt)
+    renderings, cases = made()
+    off = renderings.compare(cases[1])["c"]
+    if part == "matrices":
+        assert not off.matrices < ROUNDING
+    else:
+        assert off.matrices < ROUNDING
+        assert not np.max([off.optimum, off.violation]) < OPTIMUM
+
+
+def test_nothing_of_the_reader_is_in_a_generated_controller() -> None:
+    root = Path(qpmpc.codegen.__file__).parent
+    for file in READ:
+        assert "reader" not in (root / "runtime" / file).read_text("utf-8")
+
+
+def test_without_a_compiler_the_others_are_compared(monkeypatch) -> None:
+    monkeypatch.setattr(qpmpc.verification.equivalence, "compiler", lambda: None)
+    renderings, cases = made()
+    assert set(renderings.compare(cases[0])) == {"cvxpy", "casadi"}
+
+
 def test_twin_is_compiled_once_and_updated() -> None:
     renderings, cases = made()
     twin = renderings.twin
     assert twin.problem.is_dpp()
     values = []
-    later = replace(cases[0], soc=0.58, t_cl_degc=47.0)
+    seen = cases[0].seen._replace(soc=0.58, t_cl_degc=47.0)
+    later = replace(cases[0], seen=seen)
     for case in (cases[0], later, cases[0]):
-        data = renderings.qp.update(case.stages, case.soc, case.t_cl_degc, case.about)
-        twin.update(case.stages, case.soc, case.t_cl_degc, case.about, data.scaling)
+        data = renderings.qp.update(*renderings.inputs(case))
+        twin.update(*renderings.inputs(case), data.scaling)
         ours = matrices_of(renderings.qp.structure, data)
         assert difference(ours, cvxpy_matrices(twin), data.scaling.column) < ROUNDING
         values.append(ours.value(twin.solve().ravel()))
@@ -99,25 +164,25 @@ def test_twin_is_compiled_once_and_updated() -> None:
 
 def test_twin_plans_as_the_product_does_without_regularisation() -> None:
     renderings, cases = made()
-    case = cases[0]
-    renderings.twin.update(case.stages, case.soc, case.t_cl_degc, case.about)
+    inputs = renderings.inputs(cases[0])
+    renderings.twin.update(*inputs)
     x = renderings.twin.solve()
     assert x.shape == (renderings.qp.stages, len(Var))
-    counts = case.stages.duration_s > 0.0
+    counts = inputs[0].duration_s > 0.0
     assert np.all(x[counts, Var.ON] < 1.0 + 1e-6)
     assert np.all(x[counts, Var.ON] > -1e-6)
-    data = renderings.qp.update(case.stages, case.soc, case.t_cl_degc, case.about)
+    data = renderings.qp.update(*inputs)
     ours = matrices_of(renderings.qp.structure, data)
     assert ours.violation(x.ravel(), data.scaling.column) < 1e-6
 
 
 def test_twin_says_when_there_is_no_optimum() -> None:
     renderings, cases = made()
-    case = cases[0]
+    inputs = renderings.inputs(cases[0])
     twin = renderings.twin
-    twin.update(case.stages, case.soc, case.t_cl_degc, case.about)
+    twin.update(*inputs)
     impossible = CvxpyTwin(VEHICLE, renderings.qp.model, renderings.qp.stages)
-    impossible.update(case.stages, case.soc, case.t_cl_degc, case.about)
+    impossible.update(*inputs)
     impossible.constraints.append(impossible.soc[-1] >= 2.0)
     impossible.problem = type(twin.problem)(impossible.objective, impossible.constraints)
     with pytest.raises(QpmpcError, match="infeasible"):
@@ -133,7 +198,7 @@ def changed(matrices: Matrices, part: str, entry: tuple[int, ...], factor: float
 def test_difference_sees_any_entry_but_not_order_sign_or_scale() -> None:
     renderings, cases = made()
     case = cases[2]
-    data = renderings.qp.update(case.stages, case.soc, case.t_cl_degc, case.about)
+    data = renderings.qp.update(*renderings.inputs(case))
     column = data.scaling.column
     one = matrices_of(renderings.qp.structure, data)
     rng = np.random.default_rng(3)

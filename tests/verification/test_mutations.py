@@ -17,7 +17,6 @@ import qpmpc.preview.forecast
 import qpmpc.preview.stages
 import qpmpc.pwa.model
 import qpmpc.qp.stage_qp
-import qpmpc.verification.verify.physics_checks
 from qpmpc.controllers.mh_qp import MhQp
 from qpmpc.preview.forecast import Trace
 from qpmpc.preview.stages import StageBuilder
@@ -27,7 +26,7 @@ from qpmpc.qp.structure import QpStructure
 from qpmpc.solvers.osqp import Osqp
 from qpmpc.vehicle import Plant
 from qpmpc.vehicle.engine import OptimalLine
-from qpmpc.verification.verify import GROUPS, Context, Group, run_checks
+from qpmpc.verification.verify import GROUPS, Context, Group, physics_checks, run_checks
 from qpmpc.verification.verify.balance_checks import books_balance, limits_kept
 from qpmpc.verification.verify.bound_checks import bound_below_everything
 from qpmpc.verification.verify.physics_checks import (
@@ -154,7 +153,7 @@ MUTATIONS = [
         "heat_at_zero -= _cabin_w(th, about.t_cl_degc)", "", QP,
     ),
     Mutation(
-        "radiator of a stage as open as at its end", qpmpc.verification.verify.physics_checks, "coolant_step",
+        "radiator of a stage as open as at its end", physics_checks, "coolant_step",
         "end = np.select(cases, [after_line,",
         "end = np.select(cases, [straight / (1.0 + duration_s / tau),", (thermostat_exact,),
     ),

@@ -1,7 +1,6 @@
 """The QP: the same stages, the same problem and the same optimum as written down a second time."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -9,10 +8,9 @@ from qpmpc.preview import HorizonSettings, StageBuilder, Trace
 from qpmpc.pwa import PwaModel
 from qpmpc.qp import Linearisation, QpSettings, ScalingSettings, StageQp
 from qpmpc.qp.stage_qp import QpData
-from qpmpc.solvers.base import Floats, QpSolution, QpSolver
-from qpmpc.solvers.osqp import Osqp, OsqpSettings
-from qpmpc.solvers.registry import make_solver, solver_names
-from qpmpc.verification.kkt import kkt_residuals
+from qpmpc.qp.structure import QpStructure
+from qpmpc.solvers.base import Floats, QpSolution
+from qpmpc.solvers.registry import make_solver
 from qpmpc.verification.verify.check import Check
 from qpmpc.verification.verify.context import Context, Loop
 from qpmpc.verification.verify.stage_program import (
@@ -27,17 +25,13 @@ from qpmpc.verification.verify.stage_program import (
 )
 
 EXACT = "piqp"
-QUICK_BACKENDS = ("osqp", "piqp", "clarabel", "daqp", "qoco")  # the others take seconds a QP
 QUICK_SAMPLES, FULL_SAMPLES = 12, 60
-# First-order, or stopping at residuals that are worth this much of the fuel of a QP nearly linear
-LOOSE = {"osqp": 1e-3, "scs": 1e-3, "highs": 2e-3}
-CYCLING = ("highs",)  # see `qpmpc.solvers.highs`
-TO_THE_END = OsqpSettings(cold_iterations=100_000)  # as in a car it makes 50, from a warm start
 AGREE = 1e-5  # relative fuel; solvers are asked for 1e-8 in their own measures
 REGULARISED = 5e-5  # relative fuel that the QP's quadratic regularisation may cost
 
 
-def _samples(context: Context, loop: Loop) -> list[int]:
+def samples(context: Context, loop: Loop) -> list[int]:
+    """Steps whose QPs are checked."""
     return loop.sample(QUICK_SAMPLES if context.quick else FULL_SAMPLES)[1:]
 
 
@@ -45,7 +39,7 @@ def stages_agree(context: Context) -> Iterator[Check]:
     """Stages at many time steps against plain sums over the cycle."""
     for loop in context.loops:
         worst = 0.0
-        for step in _samples(context, loop):
+        for step in samples(context, loop):
             ours = loop.controller.planner.preview.at(step)
             theirs = horizon(loop.cycle, loop.run.vehicle, loop.settings, step)
             pairs = (
@@ -81,9 +75,9 @@ def same_optimum(context: Context) -> Iterator[Check]:
         qp = loop.controller.planner.qp
         cost_error, violation, where, entries = 0.0, 0.0, "", 0.0
         gap = 0.0
-        for step in _samples(context, loop):
+        for step in samples(context, loop):
             program, data = _program(loop, curves, step), loop.data[step]
-            solution = _exact(qp, data)
+            solution = exact(qp.structure, data)
             x = data.scaling.primal(solution.z)
             least, ours = program.least(), float(program.cost @ x)
             cost_error = max(cost_error, _relative(ours, least, program, x))
@@ -101,7 +95,7 @@ def same_optimum(context: Context) -> Iterator[Check]:
             REGULARISED,
             cost_error,
             "relative",
-            f"{len(_samples(context, loop))} recorded QPs; the QP's regularisation is in this",
+            f"{len(samples(context, loop))} recorded QPs; the QP's regularisation is in this",
         )
         yield Check(
             f"Feasibility of the QP's solution, {name}",
@@ -127,9 +121,10 @@ def same_optimum(context: Context) -> Iterator[Check]:
         )
 
 
-def _exact(qp: StageQp, data: QpData) -> QpSolution:
+def exact(structure: QpStructure, data: QpData) -> QpSolution:
+    """Solution by the reference backend."""
     solver = make_solver(EXACT, 1e-9)
-    solver.setup(qp.structure, data)
+    solver.setup(structure, data)
     return solver.solve(data, None, None, cold=True)
 
 
@@ -157,7 +152,7 @@ def warm_start_shifted(context: Context) -> Iterator[Check]:
     """Each step starts from the last solution, moved to the stages of the same seconds."""
     for loop in context.loops:
         worst = 0.0
-        for step in _samples(context, loop):
+        for step in samples(context, loop):
             scale, last = loop.data[step].scaling, loop.data[step - 1].scaling
             n = loop.controller.planner.preview.count
             z, y = loop.starts[step]
@@ -177,71 +172,6 @@ def warm_start_shifted(context: Context) -> Iterator[Check]:
         )
 
 
-def kkt_and_backends(context: Context) -> Iterator[Check]:
-    """Every installed backend on recorded QPs: KKT residuals, and the same fuel."""
-    for loop in context.loops:
-        qp = loop.controller.planner.qp
-        steps = _samples(context, loop)[:: 3 if context.quick else 4]
-        best = {step: _exact(qp, loop.data[step]) for step in steps}
-        for name in QUICK_BACKENDS if context.quick else solver_names():
-            yield _backend(name, loop, qp, best)
-
-
-def _backend(name: str, loop: Loop, qp: StageQp, best: dict[int, QpSolution]) -> Check:
-    residual, off, unsolved = 0.0, 0.0, []
-    for step, exact in best.items():
-        data = loop.data[step]
-        own = name == "osqp"
-        solver: QpSolver = Osqp(TO_THE_END) if own else make_solver(name, 1e-8)
-        solver.setup(qp.structure, data)
-        solution = solver.solve(data, None, None, cold=True)
-        if not solution.usable:
-            unsolved.append(solution.status.value)
-            continue
-        found = kkt_residuals(qp.structure, data, solution.z, solution.y)
-        residual = max(residual, found.largest)
-        fuel = np.abs(data.q) @ np.abs(exact.z)
-        off = max(off, abs(float(data.q @ (solution.z - exact.z))) / float(fuel))
-    solved = len(best) - len(unsolved)
-    detail = f"{solved} of {len(best)} solved; largest KKT residual {residual:.1e}"
-    if unsolved:
-        detail += f"; others: {', '.join(sorted(set(unsolved)))}"
-    if not solved or (unsolved and name not in CYCLING):
-        off = float("nan")
-    claim = "Every recorded QP is solved, at the same fuel as by the reference backend."
-    if name in CYCLING:
-        claim = "The recorded QPs that it solves cost the same fuel as by the reference backend."
-    title = f"Backend {name}, {loop.cycle.name}"
-    return Check(title, claim, LOOSE.get(name, AGREE), off, "relative", detail)
-
-
-def infeasible_noticed(context: Context) -> Iterator[Check]:
-    """A QP whose third stage must end at ten times the highest SOC."""
-    loop = context.loop("nycc")
-    qp = loop.controller.planner.qp
-    data = loop.data[10]
-    row = 2 * qp.rows.count + qp.rows.box_soc
-    lower, upper = data.lower.copy(), data.upper.copy()
-    lower[row] = upper[row] = 10.0 * upper[row]
-    impossible = replace(data, lower=lower, upper=upper)
-    claimed = []
-    names = [n for n in (QUICK_BACKENDS if context.quick else solver_names()) if n != "osqp"]
-    for name in names:
-        solver = make_solver(name, 1e-8)
-        solver.setup(qp.structure, data)
-        if solver.solve(impossible, None, None, cold=True).usable:
-            claimed.append(name)
-    yield Check(
-        "Infeasible QP",
-        "No backend claims to have solved a QP without a solution.",
-        0.0,
-        float(len(claimed)),
-        "backends",
-        f"asked: {', '.join(names)}; claimed: {', '.join(claimed) or 'none'}. OSQP with its fixed "
-        "iterations cannot tell: reachable limits and the safety layer stand in for it",
-    )
-
-
 def scaling_is_neutral(context: Context) -> Iterator[Check]:
     """The optimum in SI units does not depend on the solver's units."""
     vehicle = context.vehicle
@@ -259,7 +189,7 @@ def scaling_is_neutral(context: Context) -> Iterator[Check]:
     for unit in units:
         qp = StageQp(vehicle, model, preview.count, QpSettings(regularisation=1e-9), unit)
         data = qp.update(preview.at(100), 0.6, 50.0, about)
-        x = data.scaling.primal(_exact(qp, data).z)
+        x = data.scaling.primal(exact(qp.structure, data).z)
         fuels.append(float((data.q / data.scaling.column / data.scaling.cost) @ x))
     yield Check(
         "Units of the solver",

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 from qpmpc.verification.verify import (
+    backend_checks,
     balance_checks,
     bound_checks,
     epa_checks,
@@ -52,9 +53,14 @@ GROUPS = (
             qp_checks.scaling_is_neutral,
         ),
     ),
-    Group("QP backends", (qp_checks.kkt_and_backends, qp_checks.infeasible_noticed)),
-    Group("Other renderings", (rendering_checks.generated_c,)),
-    Group("The nonlinear program", (nlp_checks.against_the_nonlinear_program,), quick=False),
+    Group("QP backends", (backend_checks.recorded_qps, backend_checks.common_problems)),
+    Group("Other renderings", (rendering_checks.one_qp, rendering_checks.generated_c)),
+    Group("The nonlinear program", (nlp_checks.plans_beside_the_nonlinear_program,)),
+    Group(
+        "The nonlinear program in closed loop",
+        (nlp_checks.against_the_nonlinear_program,),
+        quick=False,
+    ),
     Group("Balances and limits", (balance_checks.books_balance, balance_checks.limits_kept)),
     Group(
         "Physics",

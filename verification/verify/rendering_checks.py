@@ -1,18 +1,59 @@
-"""The other renderings of the controller, fed with what the closed loops saw."""
+"""The other renderings of QP and controller, fed with what the closed loops saw."""
 
 from collections.abc import Iterator
 from math import nan
 
+import numpy as np
+
 from qpmpc.codegen import generated_controller
 from qpmpc.codegen.host_library import compiler
 from qpmpc.controllers.base import Observation
+from qpmpc.cycles import load_cycle
 from qpmpc.preview import Trace
 from qpmpc.vehicle import Plant
 from qpmpc.verification.verify.check import Check
 from qpmpc.verification.verify.context import Context, Loop
 
+QUICK_EVERY, QUICK_RANDOM = 30, 16  # recorded steps from one case to the next; random cases
+FULL_EVERY, FULL_RANDOM = 8, 100
+SEED = 1
+ENTRIES = 1e-12  # of rows of unit norm, in solver units: some hundred roundings
+OPTIMUM = 1e-6
+NAMES = {
+    "cvxpy": "The QP compiled by cvxpy from its equations",
+    "casadi": "The QP that CasADi derives from the bilinear problem",
+    "c": "The QP that the generated C holds, asked of its own solver,",
+}
 F64_W = 1e-3  # after hundreds of steps of warm starts, each from the last
+NO_COMPILER = "no C compiler here"
 CLAIM = "Fed with the same measurements, generated C commands the same power as Python."
+
+
+def one_qp(context: Context) -> Iterator[Check]:
+    """The QP in all its renderings, on recorded and random states."""
+    from qpmpc.verification.equivalence import check_equivalence
+
+    every, random = (QUICK_EVERY, QUICK_RANDOM) if context.quick else (FULL_EVERY, FULL_RANDOM)
+    for name in context.cycles:
+        cycle = load_cycle(name)
+        found = check_equivalence(cycle, context.vehicle, every, random, SEED, context.settings)
+        worst = found.worst()
+        cases = f"{len(found.cases) - random} recorded and {random} random cases"
+        for key, what in NAMES.items():
+            titles = (f"Matrices, {key}, {name}", f"Optimum, {key}, {name}")
+            claims = (
+                f"{what} has the same rows, bounds and cost as numpy's, in any order.",
+                f"{what} has the same optimum as numpy's, and its solution keeps numpy's rows.",
+            )
+            if key not in worst:
+                for title, claim in zip(titles, claims, strict=True):
+                    yield Check(title, claim, 0.0, nan, "", NO_COMPILER, skipped=True)
+                continue
+            of = worst[key]
+            yield Check(titles[0], claims[0], ENTRIES, of.matrices, "", cases)
+            detail = f"{cases}; cost off by {of.optimum:.1e}, rows by {of.violation:.1e}"
+            worse = float(np.max([of.optimum, of.violation]))  # nan if one of them is
+            yield Check(titles[1], claims[1], OPTIMUM, worse, "", detail)
 
 
 def generated_c(context: Context) -> Iterator[Check]:
@@ -20,7 +61,7 @@ def generated_c(context: Context) -> Iterator[Check]:
     for loop in context.loops:
         title = f"Generated C, {loop.cycle.name}"
         if compiler() is None:
-            yield Check(title, CLAIM, F64_W, nan, "W", "no C compiler here", skipped=True)
+            yield Check(title, CLAIM, F64_W, nan, "W", NO_COMPILER, skipped=True)
             continue
         worst, flips = _compare(loop, context)
         yield Check(

@@ -1,0 +1,145 @@
+"""``qpmpc pil``: one run or the Pareto front, what is written, what is refused."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+import qpmpc.codegen.pil as loop
+from qpmpc.codegen import firmware
+from qpmpc.codegen.firmware import missing_tools
+from qpmpc.codegen.pareto import ITERATIONS
+
+MISSING = missing_tools()
+needs_tools = pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}")
+QUICK = ("--set", "mh_qp.osqp.cold_iterations=50")
+
+
+@needs_tools
+def test_one_run_is_reported_and_written(cli, trip, tmp_path):
+    out = tmp_path / "out"
+    done = cli("pil", trip, *QUICK, "--out", out)
+    assert (done.code, done.err) == (0, "")
+    assert "48 steps on cortex-m7, f32, solver admm, 50 iterations" in done.out
+    for word in ("instructions a step", "estimated", "flash", "fuel", "violations", "command"):
+        assert word in done.out
+    assert {p.name for p in out.iterdir()} == {
+        f"pil_short_f32.{ending}" for ending in ("csv", "json", "png", "html")
+    }
+    rows = (out / "pil_short_f32.csv").read_text().splitlines()
+    assert len(rows) == 1 + 48
+    html = (out / "pil_short_f32.html").read_text()
+    assert "http" not in html  # nothing is fetched from elsewhere
+    assert "data:image/png;base64," in html
+    figures = json.loads((out / "pil_short_f32.json").read_text())
+    assert f"{figures['instructions']['median']:,}" in html
+
+
+@needs_tools
+def test_json_on_stdout_is_nothing_but_json(cli, trip, strict_json):
+    options = ("--solver", "osqp", "--precision", "f64", "--json", "-")
+    done = cli("pil", trip, *QUICK, *options)
+    assert done.code == 0
+    data = strict_json(done.out)
+    assert (data["solver"], data["precision"], data["steps"]) == ("osqp", "f64", 48)
+    assert abs(data["fuel_difference_percent"]) < 0.1
+    assert "solver osqp" in done.err
+
+
+@needs_tools
+def test_pareto_has_every_iteration_count_beside_the_optimum(cli, trip, tmp_path, strict_json):
+    pytest.importorskip("numba", reason="not installed: numba, for dynamic programming")
+    named = ("--precision", "f32", "--solver", "admm")
+    done = cli("pil", trip, *QUICK, *named, "--pareto", "--out", tmp_path, "--json", "-")
+    assert done.code == 0
+    data = strict_json(done.out)
+    runs = data["runs"]
+    assert [row["iterations"] for row in runs] == list(ITERATIONS)
+    counts = [row["instructions"]["median"] for row in runs]
+    assert counts == sorted(counts)
+    # the work is a constant and a multiple of K
+    slopes = [(counts[i + 1] - counts[i]) / (ITERATIONS[i + 1] - ITERATIONS[i]) for i in range(3)]
+    assert slopes == pytest.approx([slopes[0]] * 3, rel=0.01)
+    for row in runs:
+        balanced = row["fuel_soc_balanced_g"]
+        above = (balanced / data["dp_fuel_g"] - 1.0) * 100.0
+        assert row["fuel_above_dp_percent"] == pytest.approx(above)
+        assert row["fuel_above_dp_percent"] > -0.05  # the optimum's own grid error
+    assert json.loads((tmp_path / "pareto_short.json").read_text())["runs"] == runs
+    assert (tmp_path / "pareto_short.png").read_bytes().startswith(b"\x89PNG")
+    html = (tmp_path / "pareto_short.html").read_text()
+    for count in counts:
+        assert f"{count:,}" in html
+        assert f"{count:,}" in done.err  # the table
+
+
+@needs_tools
+@pytest.mark.usefixtures("no_matplotlib")
+def test_without_matplotlib_there_are_figures_but_no_picture(cli, trip, tmp_path):
+    done = cli("pil", trip, *QUICK, "--out", tmp_path / "out")
+    assert done.code == 0
+    assert "matplotlib is not installed" in done.out
+    names = {p.suffix for p in (tmp_path / "out").iterdir()}
+    assert names == {".csv", ".json"}
+
+
+@pytest.fixture
+def no_run(monkeypatch):
+    def run(*_, **__):
+        raise AssertionError("bad input must be found before any run")
+
+    monkeypatch.setattr(loop, "processor_in_the_loop", run)
+    monkeypatch.setattr("qpmpc.codegen.pareto.processor_in_the_loop", run)
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        ([], ["CYCLE", "qpmpc pil --help"]),
+        (["nonsense"], ["nonsense", "nycc", "CSV"]),
+        (["missing.csv"], ["missing.csv"]),
+        (["nycc", "extra"], ["extra"]),
+        (["nycc", "--target", "host"], ["host", "cortex-m7"]),
+        (["nycc", "--precision", "f16"], ["f16", "f32", "f64"]),
+        (["nycc", "--solver", "qpoases"], ["qpoases", "admm", "osqp"]),
+        (["nycc", "--pareto", "--solver", "qpoases"], ["qpoases", "admm", "osqp"]),
+        (["nycc", "--pareto=3"], ["--pareto"]),
+        (["nycc", "--vehicle", "beetle"], ["beetle", "prius-nimh"]),
+        (["nycc", "--set", "x"], ["KEY=VALUE"]),
+        (["nycc", "--set", "mh_qp.osqp.iterations=0"], ["iterations"]),
+        (["nycc", "--set", "mh_qp.osqp.relaxation=2.5"], ["relaxation"]),
+        (["nycc", "--json", "."], ["--json", "directory"]),
+        (["nycc", "--out", "file"], ["--out", "file"]),
+        (["nycc", "--pareto", "--out", "file/deeper"], ["--out", "file"]),
+    ],
+)
+@pytest.mark.usefixtures("no_run")
+def test_bad_input_is_one_line_and_nothing_is_written(cli, tmp_path, monkeypatch, args, words):
+    monkeypatch.chdir(tmp_path)
+    Path("file").write_text("not a folder")
+    done = cli("pil", *args)
+    assert (done.code, done.out) == (2, "")
+    assert done.err.startswith("qpmpc: ")
+    assert done.err.count("\n") == 1
+    for word in words:
+        assert word in done.err
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.usefixtures("no_run")
+def test_pareto_without_numba_is_refused(cli, monkeypatch):
+    monkeypatch.setitem(sys.modules, "numba", None)
+    done = cli("pil", "nycc", "--pareto")
+    assert done.code == 2
+    assert "numba" in done.err
+
+
+@pytest.mark.usefixtures("no_run")
+def test_missing_tools_are_named_with_their_packages(cli, monkeypatch):
+    monkeypatch.setattr(firmware.shutil, "which", lambda name: None)
+    done = cli("pil", "nycc")
+    assert (done.code, done.out) == (1, "")
+    assert done.err.count("\n") == 1
+    for word in ("arm-none-eabi-gcc", "qemu-system-arm", "apt-get install"):
+        assert word in done.err

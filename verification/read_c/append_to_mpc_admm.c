@@ -1,0 +1,71 @@
+
+/* For verification only, never part of a generated controller: reads the quadratic program out of
+ * its memory. It asks the functions that solve it, for the matrix by multiplying unit vectors and
+ * for the bounds by clipping what lies far beyond them, so that what it finds is what is solved.
+ */
+#define FAR REAL(1.0e36) /* far beyond what stands for no bound */
+
+static const int32_t reader_order[MPC_VARS] = {VAR_SOC,  VAR_T_CL,     VAR_P_ENG, VAR_ON,
+                                               VAR_FUEL, VAR_INTERNAL, VAR_SLACK};
+
+/* Entries of the matrix, (stages, rows, variables): for the stage itself and the one before. */
+void reader_matrix(const mpc_state *state, real_t *here, real_t *before)
+{
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
+        for (int32_t i = 0; i < MPC_VARS; i++) {
+            real_t unit[MPC_VARS] = {REAL(0.0)};
+            real_t value[MPC_ROWS];
+            unit[reader_order[i]] = REAL(1.0);
+            multiply(&state->stage[k], unit, nothing, value);
+            for (int32_t r = 0; r < MPC_ROWS; r++) {
+                here[(((k * MPC_ROWS) + r) * MPC_VARS) + i] = value[r];
+            }
+            multiply(&state->stage[k], nothing, unit, value);
+            for (int32_t r = 0; r < MPC_ROWS; r++) {
+                before[(((k * MPC_ROWS) + r) * MPC_VARS) + i] = value[r];
+            }
+        }
+    }
+}
+
+/* Where the duals of all rows of a stage would leave its products with the matrix. */
+static void reader_clip(const mpc_stage *stage, real_t dual, real_t *bound)
+{
+    mpc_stage probe = *stage;
+    for (int32_t i = 0; i < MPC_VARS; i++) {
+        probe.work[i] = REAL(0.0);
+    }
+    for (int32_t r = 0; r < MPC_ROWS; r++) {
+        probe.z[r] = REAL(0.0);
+        probe.y[r] = dual;
+    }
+    update(&probe, nothing);
+    for (int32_t r = 0; r < MPC_ROWS; r++) {
+        bound[r] = probe.z[r];
+    }
+}
+
+/* Bounds and row scales, (stages, rows). */
+void reader_rows(const mpc_state *state, real_t *low, real_t *high, real_t *scale)
+{
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
+        reader_clip(&state->stage[k], -FAR, &low[k * MPC_ROWS]);
+        reader_clip(&state->stage[k], FAR, &high[k * MPC_ROWS]);
+        for (int32_t r = 0; r < MPC_ROWS; r++) {
+            scale[(k * MPC_ROWS) + r] = state->stage[k].row[r];
+        }
+    }
+}
+
+/* Cost, its diagonal curvature and column scales, (stages, variables). */
+void reader_columns(const mpc_state *state, real_t *gradient, real_t *hessian, real_t *scale)
+{
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
+        const mpc_stage *const stage = &state->stage[k];
+        for (int32_t i = 0; i < MPC_VARS; i++) {
+            gradient[(k * MPC_VARS) + i] = stage->q[reader_order[i]];
+            hessian[(k * MPC_VARS) + i] = stage->hessian[reader_order[i]];
+            scale[(k * MPC_VARS) + i] = stage->column[reader_order[i]];
+        }
+    }
+}
