@@ -95,7 +95,9 @@ def _set_up(values: Values) -> osqp.OSQP:
             )
     pattern = matrix_pattern(values.sizes)
     rows, variables = pattern.shape
-    is_equality = np.arange(rows) % values.sizes.rows == Rows(1, 1).soc
+    # which rows are equalities must be right: a change refactorises
+    layout = Rows(values.sizes.fuel_pieces, values.sizes.battery_pieces)
+    is_equality = np.isin(np.arange(rows) % layout.count, (layout.soc, layout.t_cl))
     solver = osqp.OSQP()
     solver.setup(
         P=sp.identity(variables, format="csc"),

@@ -41,16 +41,11 @@ def draw_pil(result: PilResult) -> bytes:
     shown_w = np.maximum(result.command_error_w, LEAST_ERROR_W)
     error.semilogy(time_s, shown_w, ".", color=BLACK, markersize=3)
     flips = result.flips
-    error.semilogy(
-        flips,
-        shown_w[flips],
-        "o",
-        color=VERMILION,
-        markersize=5,
-        label="engine on in one, off in the other",
-    )
+    if len(flips):
+        label = "engine on in one, off in the other"
+        error.semilogy(flips, shown_w[flips], "o", color=VERMILION, markersize=5, label=label)
+        error.legend(fontsize=8, frameon=False)
     error.set_ylabel(f"command error\nW (at least {LEAST_ERROR_W:g} shown)")
-    error.legend(fontsize=8, frameon=False)
     error.set_xlabel("time, s")
     for axes in (counts, power, error):
         tidy(axes)

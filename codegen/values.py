@@ -24,10 +24,8 @@ EQUALITY_WIDTH = 1e-4  # solver units
 
 # What the C code has in common with the Python controller, by module: names in C and their values.
 CONSTANTS: dict[str, dict[str, float]] = {
-    mh_qp.__name__: {"ON_THRESHOLD": mh_qp.ON_THRESHOLD},
-    planner.__name__: {
-        "FAILURES_FORGIVEN": planner.FAILURES_FORGIVEN,
-    },
+    mh_qp.__name__: {"ON_THRESHOLD": mh_qp.ON_THRESHOLD, "LEAST_SIZE_W": mh_qp.LEAST_SIZE_W},
+    planner.__name__: {"FAILURES_FORGIVEN": planner.FAILURES_FORGIVEN},
     linearisation.__name__: {
         "COLDEST_DEGC": linearisation.COLDEST_DEGC,
         "HOTTEST_DEGC": linearisation.HOTTEST_DEGC,
@@ -46,6 +44,7 @@ CONSTANTS: dict[str, dict[str, float]] = {
         "REACH_MARGIN_SOC": stage_qp.REACH_MARGIN_SOC,
         "ACCURATE_STAGE_S": stage_qp.ACCURATE_STAGE_S,
         "SIGMA_FORCED": stage_qp.SIGMA_FORCED,
+        "LEAST_COST": stage_qp.LEAST_COST,
     },
     base.__name__: {"LARGEST_PLAUSIBLE": base.LARGEST_PLAUSIBLE},
 }

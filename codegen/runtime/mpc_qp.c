@@ -10,9 +10,6 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-#define LEAST_COST REAL(1.0e-9)
-#define LEAST_SIZE_W REAL(1000.0)
-
 /* Net power asked of engine and battery: braking beyond the charge limit is for the brakes. */
 static real_t battery_side_w(real_t demand_w)
 {

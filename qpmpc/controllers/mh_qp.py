@@ -1,5 +1,7 @@
 """The multi-horizon QP controller: plan, realise on/off, keep safe, degrade in steps."""
 
+from typing import Literal
+
 from pydantic import BaseModel, ConfigDict
 
 from qpmpc.controllers.base import Decision, Observation
@@ -19,6 +21,7 @@ from qpmpc.vehicle.plant import Command, Plant
 
 ON_THRESHOLD = 0.5  # share of a 1 s stage from which the engine runs
 PLAN_VALID_STEPS = 3  # how many steps an old plan may drive before the rules take over
+LEAST_SIZE_W = 1000.0  # power that the relaxation gap is relative to, at least
 
 
 class MhQpSettings(BaseModel):
@@ -26,6 +29,8 @@ class MhQpSettings(BaseModel):
 
     Attributes
     ----------
+    solver : `generated` (the whole controller in C, compiled for this machine), `osqp` (the same in
+        Python around OSQP) or `auto`: generated where there is a C compiler and the settings allow
     prepared : solve the first QP before the trip starts; if not, the rules drive the first steps
         while the solver warms up
     """
@@ -37,6 +42,7 @@ class MhQpSettings(BaseModel):
     qp: QpSettings = QpSettings()
     scaling: ScalingSettings = ScalingSettings()
     osqp: OsqpSettings = OsqpSettings()
+    solver: Literal["auto", "generated", "osqp"] = "auto"
     prepared: bool = True
 
 
@@ -130,4 +136,4 @@ class MhQp:
         slack = abs(float(x[Var.FUEL]) - least_fuel) * lhv_j_per_g
         slack += abs(float(x[Var.INTERNAL]) - least_internal)
         size = abs(float(x[Var.FUEL])) * lhv_j_per_g + abs(float(x[Var.INTERNAL]))
-        return slack / max(size, 1000.0)
+        return slack / max(size, LEAST_SIZE_W)

@@ -23,6 +23,7 @@ T_CL_MAX_MARGIN_K = 0.05  # small: the radiator is fully open only at the limit 
 REACH_MARGIN_SOC = 1e-5
 ACCURATE_STAGE_S = 1.0  # a stage of this length or less is known, a longer one is forecast
 SIGMA_FORCED = 0.99  # "engine must be on" as a lower bound on sigma, kept apart from the upper one
+LEAST_COST = 1e-9  # of any fuel entry: where all stages are masked the cost is scaled by this
 
 
 class QpSettings(BaseModel):
@@ -239,7 +240,7 @@ class StageQp:
         row = 1.0 / np.sqrt(np.add.reduceat(scaled * scaled, structure.entry_start, axis=1))
         scaled *= row[:, structure.entry_row]
         weighted = cost * column
-        scale = 1.0 / max(float(weighted[:, Var.FUEL].max()), 1e-9)
+        scale = 1.0 / max(float(weighted[:, Var.FUEL].max()), LEAST_COST)
         hessian = self._hessian.copy()
         gradient = scale * weighted
         if self.settings.soc_penalty_g:

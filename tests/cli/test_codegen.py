@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from qpmpc.codegen.host_library import compiler
+from qpmpc.controllers.mh_qp import MhQpSettings
 
 EXTRAS = (
     *("matplotlib", "plotly", "pandas", "casadi", "numba", "piqp", "clarabel", "daqp", "qoco"),
@@ -21,9 +22,11 @@ def test_default_is_a_host_project_that_builds(cli, tmp_path):
     done = cli("codegen", folder)
     assert (done.code, done.err) == (0, "")
     names = sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file())
+    settings = MhQpSettings()
+    stages = settings.horizon.short_stages + settings.horizon.blocks * settings.horizon.classes
     assert done.out == (
-        f"{folder}: {len(names)} files written, target host, f32, solver admm, 26 stages, "
-        "50 iterations a step; start with README.md\n"
+        f"{folder}: {len(names)} files written, target host, f32, solver admm, {stages} stages, "
+        f"{settings.osqp.iterations} iterations a step; start with README.md\n"
     )
     assert {"README.md", "NOTICE", "Makefile", "mpc.h", "mpc_admm.c", "mpc_data.c"} <= set(names)
     readme = (folder / "README.md").read_text()

@@ -88,7 +88,9 @@ def test_commands_are_those_of_osqp_in_python(result) -> None:
 def test_every_step_does_the_same_work(result) -> None:
     counts = result.summary()["instructions"]
     assert counts["spread_percent"] <= 0.1
-    assert counts["max"] <= 8_000_000  # 27 ms at 300 MHz and one cycle an instruction
+    assert counts["max"] <= 12_000_000  # 40 ms at 300 MHz and one cycle an instruction
+    # more would be a factorisation too many: a row that OSQP takes for another kind than it is
+    assert result.departure_instructions.max() <= counts["max"]
     assert result.stack_bytes <= result.footprint.stack_frames + 128
 
 
