@@ -213,7 +213,8 @@ def processor_in_the_loop(
             run = simulate(cycle, firmware, vehicle, progress=progress)
             seconds = perf_counter() - start
         memory = footprint(elf)
-    reference = simulate(cycle, "mh-qp", vehicle, settings=settings)
+    in_python = settings.with_settings({"mh_qp.solver": "osqp"})
+    reference = simulate(cycle, "mh-qp", vehicle, settings=in_python)
     return PilResult(
         target="cortex-m7",
         solver=solver,
