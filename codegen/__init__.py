@@ -2,6 +2,14 @@
 
 from qpmpc.codegen.controller import GeneratedController, generated_controller
 from qpmpc.codegen.generate import generate
+from qpmpc.codegen.host_library import compiler
 from qpmpc.codegen.values import Values, values_of
 
-__all__ = ["GeneratedController", "Values", "generate", "generated_controller", "values_of"]
+__all__ = [
+    "GeneratedController",
+    "Values",
+    "compiler",
+    "generate",
+    "generated_controller",
+    "values_of",
+]

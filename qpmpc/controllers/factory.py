@@ -19,6 +19,7 @@ from qpmpc.vehicle.plant import Plant
 from qpmpc.verification.dynamic_programming.settings import DpSettings
 
 PAPER = MhQpSettings(
+    solver="osqp",
     horizon=HorizonSettings(short_stages=20, blocks=0, block_s=20, classes=1),
 )
 
@@ -82,6 +83,17 @@ def _rule_based(plant: Plant, truth: Trace, forecast: Trace, s: ControllerSettin
 
 
 def _mh_qp(plant: Plant, truth: Trace, forecast: Trace, s: ControllerSettings) -> Controller:
+    solver = s.mh_qp.solver
+    if solver != "osqp":
+        # here, as it imports this module
+        from qpmpc.codegen import compiler, generated_controller
+
+        if solver == "generated" or compiler() is not None:
+            try:
+                return generated_controller(plant, truth, forecast, s)
+            except InputError:  # a setting that generated code does not have
+                if solver == "generated":
+                    raise
     return MhQp("mh-qp", plant, truth, forecast, s.mh_qp, s.rule_based)
 
 

@@ -82,6 +82,8 @@ def _text(value: Any) -> str:
 def _remarks(rows: Sequence[Row], settings: ControllerSettings) -> list[str]:
     """What a reader must know before believing the table."""
     present = {row["controller"] for row in rows}
+    solvers = {row["controller"]: row["solver"]["name"] for row in rows if row["solver"]["name"]}
+    solved_by = ", ".join(f"{controller} by {solver}" for controller, solver in solvers.items())
     remarks = [
         "Balanced fuel is the fuel burnt plus that which the difference between initial and final "
         "SOC is worth at the efficiency trip.eta_eq. Savings and distances compare balanced fuel.",
@@ -89,7 +91,8 @@ def _remarks(rows: Sequence[Row], settings: ControllerSettings) -> list[str]:
         "no forecast error.",
         "Step times are wall times of one decision in this Python process, all runs one after the "
         "other. A QP controller that is prepared (its setting below) solves its first QP before "
-        "the trip starts: that time is not among them.",
+        "the trip starts: that time is not among them. "
+        + (f"Solved: {solved_by}." if solved_by else ""),
     ]
     if REFERENCE in present:
         remarks.append(

@@ -19,7 +19,7 @@ INNER_KEYS = {
 }
 
 
-SOLVERS = {"mh-qp": "osqp", "mh-qp-paper": "osqp", "mh-nlp": "ipopt", "rule-based": None}
+SOLVERS = {"mh-qp": "generated f64", "mh-qp-paper": "osqp", "mh-nlp": "ipopt", "rule-based": None}
 
 
 @pytest.mark.parametrize("controller", SOLVERS)

@@ -14,6 +14,7 @@ from qpmpc.controllers.factory import ControllerSettings, make_controller
 from qpmpc.controllers.mh_qp import MhQp
 from qpmpc.controllers.planner import FAILURES_FORGIVEN
 from qpmpc.cycles import load_cycle
+from qpmpc.errors import InputError
 from qpmpc.preview import StageBuilder, Trace
 from qpmpc.preview.stages import Stages
 from qpmpc.simulate import simulate
@@ -37,7 +38,9 @@ def pair(
     cycle, plant = load_cycle(cycle_name), Plant(vehicle)
     trace, settings = Trace.of(cycle, vehicle), settings_of(**overrides)
     ours = generated_controller(plant, trace, settings=settings, precision=precision)
-    reference = make_controller("mh-qp", plant, trace, settings=settings)
+    reference = make_controller(
+        "mh-qp", plant, trace, settings=settings.with_settings({"mh_qp.solver": "osqp"})
+    )
     assert isinstance(reference, MhQp)
     return plant, trace, ours, reference
 
@@ -129,7 +132,7 @@ def test_single_precision_burns_the_same_fuel(name) -> None:
     single = simulate(
         cycle, generated_controller(plant, Trace.of(cycle, VEHICLE), precision="f32"), VEHICLE
     )
-    python = simulate(cycle, "mh-qp", VEHICLE)
+    python = simulate(cycle, "mh-qp", VEHICLE, settings=settings_of(mh_qp__solver="osqp"))
     assert single.fuel_soc_balanced_g == pytest.approx(python.fuel_soc_balanced_g, rel=1e-3)
     assert single.summary()["violations"] == {"soc": 0.0, "t_cl_degc": 0.0, "power_w": 0.0}
     assert single.summary()["fallback_steps"] == 0
@@ -305,3 +308,20 @@ def test_a_plan_from_which_solves_fail_again_and_again_is_given_up_by_both() -> 
     warming_up = [WARMING_UP] * 4
     expected = [0, *([SOLVER_FAILED] * (FAILURES_FORGIVEN + 1)), *warming_up, *([0] * 4)]
     assert flags_after_a_spoilt_preview() == expected
+
+
+def test_default_is_generated_c_where_it_can_be_and_osqp_elsewhere(monkeypatch) -> None:
+    plant = Plant(VEHICLE)
+    trace = Trace.of(load_cycle("nycc"), VEHICLE)
+
+    def solver_name(**overrides: object) -> str:
+        return make_controller("mh-qp", plant, trace, settings=settings_of(**overrides)).solver_name
+
+    assert solver_name() == "generated f64"
+    assert solver_name(mh_qp__solver="osqp") == "osqp"
+    no_blocks = {"mh_qp__horizon__blocks": 0, "mh_qp__horizon__block_s": 0}
+    assert solver_name(**no_blocks) == "osqp"
+    with pytest.raises(InputError, match="blocks"):
+        solver_name(mh_qp__solver="generated", **no_blocks)
+    monkeypatch.setattr("qpmpc.codegen.compiler", lambda: None)
+    assert solver_name() == "osqp"

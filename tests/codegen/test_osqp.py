@@ -32,6 +32,8 @@ CAR = load_vehicle()
 NYCC = load_cycle("nycc")
 TRACE = Trace.of(NYCC, CAR)
 SETTINGS = ControllerSettings()
+OSQP: dict[str, object] = {"mh_qp.solver": "osqp"}
+IN_PYTHON = SETTINGS.with_settings(OSQP)
 SOLVER_FAILED, WARMING_UP = 4, 8
 
 
@@ -79,7 +81,7 @@ def drive(ours, steps: int, reference=None, vehicle=CAR):
 # The same program, factorised in another order: round-off, as with the solver of our own.
 def test_double_precision_equals_python_to_the_end_of_the_trip(files) -> None:
     ours = controller(library_of(files))
-    reference = make_controller("mh-qp", Plant(CAR), TRACE)
+    reference = make_controller("mh-qp", Plant(CAR), TRACE, settings=IN_PYTHON)
     assert isinstance(reference, MhQp)
     for k, (mine, its) in enumerate(drive(ours, TRACE.steps, reference)):
         assert mine.command.engine_on == its.command.engine_on
@@ -109,7 +111,9 @@ def test_other_vehicles_and_settings_equal_python(vehicle, overrides) -> None:
     of_car = numbers(settings, car)
     library = HostLibrary(compiled(project_files(of_car, "host", "f64", "osqp")), of_car, "f64")
     ours = controller(library, TRACE, settings, car, settings.mh_qp.prepared)
-    reference = make_controller("mh-qp", Plant(car), TRACE, settings=settings)
+    reference = make_controller(
+        "mh-qp", Plant(car), TRACE, settings=settings.with_settings(OSQP)
+    )
     for mine, its in drive(ours, 120, reference, car):
         assert mine.command.engine_on == its.command.engine_on
         assert mine.command.p_eng_w == pytest.approx(its.command.p_eng_w, abs=1e-2)
@@ -119,7 +123,7 @@ def test_other_vehicles_and_settings_equal_python(vehicle, overrides) -> None:
 def test_single_precision_burns_the_same_fuel() -> None:
     library = library_of(project_files(numbers(), "host", "f32", "osqp"), precision="f32")
     run = simulate(NYCC, controller(library), CAR)
-    python = simulate(NYCC, "mh-qp", CAR)
+    python = simulate(NYCC, "mh-qp", CAR, settings=IN_PYTHON)
     assert run.fuel_soc_balanced_g == pytest.approx(python.fuel_soc_balanced_g, rel=1e-3)
     assert run.summary()["violations"] == {"soc": 0.0, "t_cl_degc": 0.0, "power_w": 0.0}
     assert run.summary()["fallback_steps"] == 0
@@ -294,7 +298,7 @@ def test_a_failure_inside_osqp_is_noticed_and_leaves_nothing_behind(probed, faul
     library, probe_fault = probed
     code, is_fine = FAULTS[fault]
     ours = controller(library)
-    reference = make_controller("mh-qp", Plant(CAR), TRACE)
+    reference = make_controller("mh-qp", Plant(CAR), TRACE, settings=IN_PYTHON)
     seen = []
     for k, (mine, its) in enumerate(drive(ours, 14, reference)):
         if k not in (10, 11):  # spoilt, and the one that starts from an older iterate

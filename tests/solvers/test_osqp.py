@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from qpmpc.controllers.factory import make_controller
+from qpmpc.controllers.factory import ControllerSettings, make_controller
 from qpmpc.controllers.mh_qp import MhQp
 from qpmpc.cycles import load_cycle
 from qpmpc.preview import Trace
@@ -18,7 +18,8 @@ def recorded():
     """A planner after its departure on NYCC, with the data of its first QP."""
     plant = Plant(load_vehicle())
     truth = Trace.of(load_cycle("nycc"), plant.vehicle)
-    controller = make_controller("mh-qp", plant, truth)
+    settings = ControllerSettings().with_settings({"mh_qp.solver": "osqp"})
+    controller = make_controller("mh-qp", plant, truth, settings=settings)
     assert isinstance(controller, MhQp)
     controller.planner.solve(0, 0.6, 50.0)
     return controller.planner

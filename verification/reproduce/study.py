@@ -190,6 +190,7 @@ def _snapshot(
     cycle: Cycle, label: str, vehicle: Vehicle, settings: ControllerSettings, step: int
 ) -> Snapshot:
     truth = Trace.of(cycle, vehicle)
+    settings = settings.with_settings({"mh_qp.solver": "osqp"})  # whose plan can be looked at
     controller = make_controller(label, Plant(vehicle), truth, settings=settings)
     if not isinstance(controller, MhQp):
         raise TypeError(f"{label} has no horizon to show")
