@@ -10,7 +10,8 @@ from qpmpc.cycles import load_cycle
 from qpmpc.preview.forecast import Trace
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
-from qpmpc.qp.stage_qp import Linearisation, StageQp
+from qpmpc.qp.linearisation import Linearisation
+from qpmpc.qp.stage_qp import StageQp
 from qpmpc.solvers.osqp import Osqp
 from qpmpc.vehicle.parameters import Vehicle
 
