@@ -81,7 +81,15 @@ class GeneratedController:
 
     def decide(self, seen: Observation) -> Decision:
         """Run one step in C."""
+        self.fill(seen)
+        return self.step()
+
+    def fill(self, seen: Observation) -> None:
+        """Write the input of the next step."""
         self._inputs.fill(seen, self._in)
+
+    def step(self) -> Decision:
+        """Run one step in C on the input as it stands."""
         self.library.step(*self._arguments)
         out = self._out
         planned = out.rung == 0

@@ -7,6 +7,7 @@ import typer
 from qpmpc.cli.options import JsonOption, OutOption, VehicleOption
 
 CYCLES = ("nycc", "nedc-truncated")
+QUICK = {"generated K=25", "generated K=50", "osqp K=50", "piqp"}
 
 
 def benchmark(
@@ -38,7 +39,7 @@ def benchmark(
     trips = [load_cycle(name) for name in (CYCLES[:1] if quick else CYCLES)]
     chosen = candidates()
     if quick:
-        chosen = tuple(c for c in chosen if c.label in {"osqp K=25", "osqp K=50", "piqp"})
+        chosen = tuple(c for c in chosen if c.label in QUICK)
     with progress_bar(len(trips) * (len(chosen) + 1) + 1) as bar:
         result = run(trips, car, chosen, bar.next_job)
     write_json(result.as_data(), json_file)

@@ -53,6 +53,16 @@ def test_a_rival_drives_with_its_own_answers(short):
     assert row["iterations_max"] < 200  # an interior-point method, not OSQP in disguise
 
 
+def test_generated_c_is_timed_and_burns_what_osqp_burns(short, driven):
+    overrides = driven.candidate.overrides
+    generated = Candidate("generated K=20", "generated C, fixed K", overrides, generated=True)
+    again = drive(generated, short, VEHICLE, repetitions=1)
+    assert again.stages == driven.stages
+    assert again.solve_ms.shape == again.update_ms.shape == (1, short.steps)
+    assert np.all(again.step_ms >= again.solve_ms)
+    assert again.run.fuel_soc_balanced_g == pytest.approx(driven.run.fuel_soc_balanced_g, rel=1e-6)
+
+
 def test_exported_qps_are_the_controllers(short):
     recording = record(short, VEHICLE)
     with np.load(BytesIO(recorded_npz(recording))) as data:

@@ -13,7 +13,7 @@ from qpmpc.verification.benchmark.drive import Drive, drive
 from qpmpc.verification.benchmark.growth import growth
 from qpmpc.verification.dynamic_programming import solve_dp
 
-REPETITIONS_OSQP, REPETITIONS_RIVAL = 3, 1
+REPETITIONS = 3
 Job = Callable[[str], Progress]
 
 
@@ -38,7 +38,7 @@ class Benchmark:
             "runs": self.rows,
             "growth": self.growth,
             "rival_tolerance": RIVAL_TOLERANCE,
-            "repetitions": {"osqp": REPETITIONS_OSQP, "rivals": REPETITIONS_RIVAL},
+            "repetitions": REPETITIONS,
             "provenance": provenance(),
         }
 
@@ -61,8 +61,7 @@ def benchmark(
         dp_fuel_g = float(solution.fuel_g.sum())
         for candidate in chosen:
             report = next_job(f"{cycle.name}, {candidate.label}")
-            repetitions = REPETITIONS_RIVAL if candidate.solver else REPETITIONS_OSQP
-            driven = drive(candidate, cycle, vehicle, repetitions, report)
+            driven = drive(candidate, cycle, vehicle, REPETITIONS, report)
             drives.append(driven)
             rows.append(driven.row(dp_fuel_g))
     report = next_job("growth over stages")

@@ -1,9 +1,10 @@
-"""What is compared: OSQP at fixed iteration counts and settings, and rivals at a tolerance."""
+"""What is compared: generated C and OSQP at fixed iteration counts, and rivals at a tolerance."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 
+from qpmpc.codegen import compiler
 from qpmpc.solvers.base import QpSolver
 from qpmpc.solvers.registry import make_solver, solver_names
 
@@ -23,6 +24,7 @@ class Candidate:
     overrides : dotted settings of the controller
     solver : makes the backend; OSQP with the settings' own values if None
     controller : name of the controller whose settings are used
+    generated : whether it is the generated C controller, the default of `mh-qp`
     """
 
     label: str
@@ -30,11 +32,13 @@ class Candidate:
     overrides: dict[str, object] = field(default_factory=dict)
     solver: Callable[[], QpSolver] | None = None
     controller: str = "mh-qp"
+    generated: bool = False
 
 
 def candidates() -> tuple[Candidate, ...]:
     """Return all candidates that can run with the packages installed here."""
-    found = [
+    found = [_generated(k) for k in ITERATIONS] if compiler() is not None else []
+    found += [
         Candidate(f"osqp K={k}", "osqp, fixed K", {"mh_qp.osqp.iterations": k}) for k in ITERATIONS
     ]
     found += [
@@ -47,6 +51,11 @@ def candidates() -> tuple[Candidate, ...]:
     found.append(Candidate("osqp, paper's grid", "paper's grid", controller="mh-qp-paper"))
     found += [_rival(name) for name in solver_names() if name != "osqp" and _installed(name)]
     return tuple(found)
+
+
+def _generated(k: int) -> Candidate:
+    overrides: dict[str, object] = {"mh_qp.osqp.iterations": k}
+    return Candidate(f"generated K={k}", "generated C, fixed K", overrides, generated=True)
 
 
 def _rival(name: str) -> Candidate:

@@ -10,6 +10,7 @@ from qpmpc.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILI
 from qpmpc.verification.benchmark.drive import Drive
 
 FAMILY_COLORS = {
+    "generated C, fixed K": BLACK,
     "osqp, fixed K": VERMILION,
     "osqp, other rho": ORANGE,
     "osqp, other scaling": PURPLE,
@@ -35,14 +36,14 @@ def draw_pareto(rows: Sequence[dict[str, Any]]) -> bytes:
             axes.plot(
                 worst,
                 above,
-                "o-" if family == "osqp, fixed K" else "o",
+                "o-" if family.endswith("fixed K") else "o",
                 color=color,
                 markersize=5,
                 linewidth=0.8,
                 label=family,
             )
             for row, x, y in zip(chosen, worst, above, strict=True):
-                short = row["candidate"].removeprefix("osqp").lstrip(", ")
+                short = row["candidate"].removeprefix("osqp").removeprefix("generated").lstrip(", ")
                 axes.annotate(
                     short, (x, y), xytext=(4, 3), textcoords="offset points", fontsize=6.5
                 )

@@ -12,7 +12,7 @@ from qpmpc.verification.benchmark.benchmark import Benchmark
 from qpmpc.verification.benchmark.candidates import RIVAL_TOLERANCE
 from qpmpc.verification.benchmark.pictures import draw_growth, draw_histogram, draw_pareto
 
-IN_HISTOGRAM = ("osqp K=50", "osqp K=25", "piqp", "clarabel", "osqp, paper's grid")
+IN_HISTOGRAM = ("generated K=50", "osqp K=50", "piqp", "clarabel", "osqp, paper's grid")
 
 
 def write_benchmark(result: Benchmark, vehicle: Vehicle, folder: Path) -> None:
