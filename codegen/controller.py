@@ -101,6 +101,10 @@ class GeneratedController:
             out.sigma if planned else float("nan"),
         )
 
+    def reset(self) -> None:
+        """Forget plan, warm start and the rules' memory, as after a restart of the ECU."""
+        self.library.init(self._state)
+
     def plan(self) -> tuple[Floats, Floats]:
         """Return the last solution in SI units: variables (n, 7), duals (n, rows)."""
         sizes = self.library.values.sizes

@@ -12,7 +12,7 @@ from qpmpc.codegen.values import CONSTANTS
 from qpmpc.controllers.base import Decision, Observation
 from qpmpc.controllers.factory import ControllerSettings, make_controller
 from qpmpc.controllers.mh_qp import MhQp
-from qpmpc.controllers.planner import FAILURES_FORGIVEN
+from qpmpc.controllers.planner import FAILURES_FORGIVEN, WARM_UP_STEPS
 from qpmpc.cycles import load_cycle
 from qpmpc.errors import InputError
 from qpmpc.preview import StageBuilder, Trace
@@ -325,3 +325,20 @@ def test_default_is_generated_c_where_it_can_be_and_osqp_elsewhere(monkeypatch) 
         solver_name(mh_qp__solver="generated", **no_blocks)
     monkeypatch.setattr("qpmpc.codegen.compiler", lambda: None)
     assert solver_name() == "osqp"
+
+
+def test_reset_on_the_road_costs_the_same_warm_up_as_in_python() -> None:
+    plant, trace, ours, reference = pair("nycc")
+    state, rungs = plant.initial_state(), []
+    for k in range(260):
+        if k == 200:
+            ours.reset()
+            reference.reset()
+        mine, its = (c.decide(observe(trace, state, k)) for c in (ours, reference))
+        if k > 210:  # the rules, whose memory C has lost, drive the first seconds after the reset
+            assert mine.command.p_eng_w == pytest.approx(its.command.p_eng_w, abs=1.0)
+        assert (mine.fallback == "rule-based") == (its.fallback == "rule-based")
+        rungs.append(mine.fallback)
+        demand_w, speed_mps = float(trace.demand_w[k]), float(trace.speed_mps[k])
+        state, _ = plant.step(state, its.command, demand_w, speed_mps)
+    assert rungs.count("rule-based") == WARM_UP_STEPS - 1
