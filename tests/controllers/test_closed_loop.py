@@ -52,10 +52,20 @@ def test_longer_cycles_stay_within_limits(cycle):
     assert summary["comparable"]
 
 
+# Once a kelvin or two over 90 degC there: the plan took the radiator for as open as it liked.
+@pytest.mark.parametrize("vehicle", ["prius-nimh", "prius-liion"])
+def test_hot_coolant_in_mild_weather_keeps_its_limit(vehicle):
+    car = load_vehicle(vehicle).with_settings({"thermal.t_amb_degc": 10.0})
+    summary = simulate(load_cycle("wltc-3b"), "mh-qp", car).summary()
+    assert summary["t_cl_max_degc"] > 89.0  # else nothing would be tested
+    assert summary["violations"] == NO_VIOLATION
+    assert summary["fallback_steps"] == 0
+
+
 def test_the_relaxation_is_tight_and_nearly_integral(runs):
     summary = runs["nycc", "mh-qp"].summary()
     assert summary["relaxation_gap"]["mean"] < 0.02  # 50 iterations, not a converged solution
-    assert summary["sigma_integral_share"] > 0.9
+    assert summary["sigma_integral_share"] > 0.95
 
 
 def test_charge_is_sustained(runs):
