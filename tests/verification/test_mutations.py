@@ -11,24 +11,47 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import pytest
 
+import qpmpc.codegen.values
 import qpmpc.preview.forecast
 import qpmpc.preview.stages
 import qpmpc.pwa.model
 import qpmpc.qp.stage_qp
+from qpmpc.codegen.host_library import compiler
+from qpmpc.controllers.factory import ControllerSettings
 from qpmpc.controllers.mh_qp import MhQp
+from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.preview.forecast import Trace
 from qpmpc.preview.stages import StageBuilder
+from qpmpc.qp.cvxpy_twin import CvxpyTwin
 from qpmpc.qp.scaling import Scaling
 from qpmpc.qp.stage_qp import StageQp
 from qpmpc.qp.structure import QpStructure
+from qpmpc.solvers.forms import OneSided
 from qpmpc.solvers.osqp import Osqp
+from qpmpc.solvers.qoco import Qoco
 from qpmpc.vehicle import Plant
 from qpmpc.vehicle.engine import OptimalLine
-from qpmpc.verification.verify import GROUPS, Context, Group, physics_checks, run_checks
+from qpmpc.verification.casadi_qp import CasadiQp
+from qpmpc.verification.verify import (
+    GROUPS,
+    Context,
+    Group,
+    backend_checks,
+    nlp_checks,
+    physics_checks,
+    rendering_checks,
+    run_checks,
+)
+from qpmpc.verification.verify.backend_checks import common_problems
 from qpmpc.verification.verify.balance_checks import books_balance, limits_kept
 from qpmpc.verification.verify.bound_checks import bound_below_everything
+from qpmpc.verification.verify.nlp_checks import (
+    against_the_nonlinear_program,
+    plans_beside_the_nonlinear_program,
+)
 from qpmpc.verification.verify.physics_checks import (
     constant_demand,
     engine_covers_demand,
@@ -42,13 +65,18 @@ from qpmpc.verification.verify.qp_checks import (
     warm_start_shifted,
 )
 from qpmpc.verification.verify.relaxation_checks import expansion_small, relaxation_tight
+from qpmpc.verification.verify.rendering_checks import one_qp
 
 pytestmark = pytest.mark.slow
 
 
 @dataclass(frozen=True)
 class Mutation:
-    """`old` becomes `new` in the function `name` of `owner`; `checks` should notice."""
+    """`old` becomes `new` in the function `name` of `owner`; `checks` should notice.
+
+    `noticed` are beginnings of names of checks that must be among those that fail; without any,
+    one is enough.
+    """
 
     title: str
     owner: Any
@@ -56,15 +84,19 @@ class Mutation:
     old: str
     new: str
     checks: tuple[Callable[..., Any], ...]
+    noticed: tuple[str, ...] = ()
 
 
 QP, STAGES, PLANT = (same_optimum,), (stages_agree,), (books_balance,)
+RENDERINGS, BACKENDS = (one_qp,), (common_problems,)
+NLP = (plans_beside_the_nonlinear_program,)
 
 MUTATIONS = [
     # plant
     Mutation(
         "discharge raises SOC (eq. 1)", Plant, "step",
-        "state.soc - h * current", "state.soc + h * current", PLANT,
+        "state.soc - h * current", "state.soc + h * current", (*PLANT, *NLP),
+        ("Balance of charge", "States without a plan"),
     ),
     Mutation(
         "plant forgets auxiliary power (eq. 2)", Plant, "step",
@@ -80,7 +112,8 @@ MUTATIONS = [
     ),
     Mutation(
         "heating value in kJ", OptimalLine, "__init__",
-        "engine.lhv_j_per_kg * 1e3", "engine.lhv_j_per_kg", (engine_covers_demand,),
+        "engine.lhv_j_per_kg * 1e3", "engine.lhv_j_per_kg", (engine_covers_demand, *NLP),
+        ("No battery use", "First command, power", "Predicted SOC", "Planned fuel"),
     ),
     Mutation(
         "demand times driveline efficiency", qpmpc.preview.forecast, "demand_w",
@@ -121,11 +154,13 @@ MUTATIONS = [
     ),
     Mutation(
         "alpha' = 0", qpmpc.qp.stage_qp, "coolant_row",
-        "* about.fuel_g_per_s\n    ua", "* 0.0\n    ua", QP,
+        "* about.fuel_g_per_s\n    ua", "* 0.0\n    ua", (*QP, *RENDERINGS),
+        ("Matrices, cvxpy", "Matrices, casadi", "Optimum, cvxpy", "Optimum, casadi"),
     ),
     Mutation(
         "wrong terminal band", StageQp, "_terminal",
-        "return multiple", "return 0.98 * multiple", QP,
+        "return multiple", "return 0.98 * multiple", (*QP, *NLP),
+        ("Optimum of the QP", "First command, on or off", "Planned fuel"),
     ),
     Mutation(
         "UA of a stage in km/h", qpmpc.qp.stage_qp, "coolant_row",
@@ -150,7 +185,8 @@ MUTATIONS = [
     ),
     Mutation(
         "no cabin heat", qpmpc.qp.stage_qp, "coolant_row",
-        "heat_at_zero -= _cabin_w(th, about.t_cl_degc)", "", QP,
+        "heat_at_zero -= _cabin_w(th, about.t_cl_degc)", "", (*QP, *NLP),
+        ("Optimum of the QP", "Predicted T_cl"),
     ),
     Mutation(
         "radiator of a stage as open as at its end", physics_checks, "coolant_step",
@@ -170,6 +206,38 @@ MUTATIONS = [
         "warm start is not shifted", StageBuilder, "shift",
         "+= 1", "+= 0", (warm_start_shifted,),
     ),
+    # other renderings
+    Mutation(
+        "cvxpy without the off-part of the perspective", CvxpyTwin, "_battery",
+        "self._off_w - cp.multiply", "0.0 * self._off_w - cp.multiply", RENDERINGS,
+        ("Matrices, cvxpy", "Optimum, cvxpy"),
+    ),
+    Mutation(
+        "CasADi with another terminal band", CasadiQp, "_soc_limits",
+        "max(settings.terminal_low", "max(0.99 * settings.terminal_low", RENDERINGS,
+        ("Matrices, casadi", "Optimum, casadi"),
+    ),
+    Mutation(
+        "generated C with another terminal band", qpmpc.codegen.values, "_problem",
+        "max(qp.terminal_low * soc_init", "max(0.99 * qp.terminal_low * soc_init", RENDERINGS,
+        ("Matrices, c", "Optimum, c"),
+    ),
+    # backends
+    Mutation(
+        "one-sided rows with a side forgotten", OneSided, "right_sides",
+        "-data.lower[self._below]", "-0.9 * data.lower[self._below]", BACKENDS,
+        ("Backend clarabel", "Backend qoco", "KKT residuals, clarabel"),
+    ),
+    Mutation(
+        "duals of lower sides with the wrong sign", OneSided, "join",
+        "y[self._below] -= inequality", "y[self._below] += inequality", BACKENDS,
+        ("KKT residuals, clarabel", "KKT residuals, qoco"),
+    ),
+    Mutation(
+        "a backend calls the infeasible solved", Qoco, "_run",
+        "status = Status.INFEASIBLE", "status = Status.SOLVED", BACKENDS,
+        ("Infeasible QPs, qoco",),
+    ),
     # closed loop
     Mutation(
         "solver keeps old bounds", Osqp, "solve",
@@ -181,6 +249,14 @@ MUTATIONS = [
         (limits_kept, bound_below_everything, relaxation_tight),
     ),
 ]  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def fewer(monkeypatch):
+    """A part of what the quick run tries is enough here, and takes a fifth of the time."""
+    monkeypatch.setattr(rendering_checks, "QUICK_EVERY", 150)
+    monkeypatch.setattr(rendering_checks, "QUICK_RANDOM", 4)
+    monkeypatch.setattr(backend_checks, "QUICK_BACKENDS", ("clarabel", "daqp", "qoco"))
 
 
 def failures(*checks: Callable[..., Any]) -> list[str]:
@@ -204,12 +280,38 @@ def mutate(monkeypatch: pytest.MonkeyPatch, mutation: Mutation) -> None:
 
 @pytest.mark.parametrize("mutation", MUTATIONS, ids=lambda mutation: mutation.title)
 def test_mutation_is_caught(monkeypatch, mutation):
+    if mutation.owner is qpmpc.codegen.values and compiler() is None:
+        pytest.skip("no C compiler on this machine")
     quick = [check for group in GROUPS if group.quick for check in group.checks]
     assert set(mutation.checks) <= set(quick)
     mutate(monkeypatch, mutation)
-    assert failures(*mutation.checks)
+    found = failures(*mutation.checks)
+    assert found
+    for name in mutation.noticed:
+        assert any(failed.startswith(name) for failed in found), found
 
 
 def test_the_product_as_it_is_passes_the_same_checks():
     checks = {check: None for mutation in MUTATIONS for check in mutation.checks}
     assert failures(*checks, trip_error_small, expansion_small) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "failing"),
+    [
+        ({}, set()),
+        ({"mh_qp.osqp.iterations": 2}, {"Fuel beside mh-nlp"}),
+        ({"mh_qp.osqp.iterations": 3000}, {"Time beside mh-nlp"}),
+    ],
+)
+def test_closed_loops_beside_the_nonlinear_program(monkeypatch, changes, failing):
+    """The full run's checks fail too: where `mh-qp` hardly solves its QPs, or takes its time."""
+    whole, part = load_cycle("nycc"), slice(60, 181)
+    short = Cycle("short", np.arange(121.0), whole.speed_mps[part], whole.grade[part])
+    monkeypatch.setattr(nlp_checks, "cycle_names", lambda: ("short",))
+    monkeypatch.setattr(nlp_checks, "load_cycle", lambda name: short)
+    context = Context(quick=False)
+    context.settings = ControllerSettings().with_settings(changes)
+    found = list(run_checks(Group("", (against_the_nonlinear_program,)), context))
+    assert len(found) == 2
+    assert {check.name.partition(",")[0] for check in found if not check.passed} == failing
