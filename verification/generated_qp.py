@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 READ = ("mpc_admm.c", "mpc_step.c")
 UNBOUNDED = 1e29  # in solver units; the C code means 1e30
-SLICE, SLICES = 10_000, 100  # iterations between two looks at the residuals, and how often at most
+SLICE, SLICES = 10_000, 300  # iterations between two looks at the residuals, and how often at most
 GAP = 100.0  # the gap falls later than the error in the cost, to which it is an upper bound
 
 
