@@ -4,6 +4,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_matrix
+from scipy.sparse.linalg import splu
 
 from qpmpc.qp.cvxpy_twin import UNIT, CvxpyTwin
 from qpmpc.qp.structure import VARS, Var
@@ -44,8 +46,8 @@ def _reduced(data: dict[str, Any], ours: NDArray[np.intp], unit: Floats) -> Matr
     rows = np.concatenate([pins, defining])
     if len(rows) != len(others):
         raise RuntimeError("cvxpy has compiled the twin into a form that is not understood")
-    inverse = np.linalg.inv(left[np.ix_(rows, others)])
-    m, offset = -inverse @ left[np.ix_(rows, ours)], inverse @ b[rows]
+    factor = splu(csc_matrix(left[np.ix_(rows, others)]))
+    m, offset = -factor.solve(left[np.ix_(rows, ours)]), factor.solve(b[rows])
     reduced = a[:, ours] + a[:, others] @ m
     right = b - a[:, others] @ offset
     own = np.setdiff1d(np.arange(count), rows)
