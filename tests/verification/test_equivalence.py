@@ -58,8 +58,8 @@ def assert_equal(renderings: Renderings, case: QpCase) -> None:
 
 
 def test_recorded_and_random_cases() -> None:
-    equivalence = check_equivalence(beginning("nycc", 150), VEHICLE, every=15, random=14)
-    assert equivalence.to_dict()["cases"] == 24
+    equivalence = check_equivalence(beginning("nycc", 150), VEHICLE, every=30, random=7)
+    assert equivalence.to_dict()["cases"] == 12
     worst = equivalence.worst()
     assert set(worst) == ALL
     for name, off in worst.items():
@@ -124,6 +124,7 @@ def test_c_that_differs_is_noticed(monkeypatch, file, old, new, part) -> None:
         return files
 
     monkeypatch.setattr(qpmpc.verification.generated_qp, "project_files", spoilt)
+    monkeypatch.setattr(qpmpc.verification.generated_qp, "SLICES", 30)  # it may never converge
     renderings, cases = made()
     off = renderings.compare(cases[1])["c"]
     if part == "matrices":

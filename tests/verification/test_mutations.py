@@ -34,7 +34,9 @@ from qpmpc.solvers.osqp import Osqp
 from qpmpc.solvers.qoco import Qoco
 from qpmpc.vehicle import Plant
 from qpmpc.vehicle.engine import OptimalLine
+from qpmpc.verification import generated_qp
 from qpmpc.verification.casadi_qp import CasadiQp
+from qpmpc.verification.nlp_solver import NlpSolver
 from qpmpc.verification.verify import (
     GROUPS,
     Context,
@@ -95,8 +97,7 @@ MUTATIONS = [
     # plant
     Mutation(
         "discharge raises SOC (eq. 1)", Plant, "step",
-        "state.soc - h * current", "state.soc + h * current", (*PLANT, *NLP),
-        ("Balance of charge", "States without a plan"),
+        "state.soc - h * current", "state.soc + h * current", PLANT,
     ),
     Mutation(
         "plant forgets auxiliary power (eq. 2)", Plant, "step",
@@ -160,7 +161,7 @@ MUTATIONS = [
     Mutation(
         "wrong terminal band", StageQp, "_terminal",
         "return multiple", "return 0.98 * multiple", (*QP, *NLP),
-        ("Optimum of the QP", "First command, on or off", "Planned fuel"),
+        ("Optimum of the QP", "Planned fuel"),
     ),
     Mutation(
         "UA of a stage in km/h", qpmpc.qp.stage_qp, "coolant_row",
@@ -177,7 +178,8 @@ MUTATIONS = [
     Mutation(
         "off-part of the perspective is dropped", StageQp, "_fill_battery",
         "self._lower[:, rows.battery] = off_w[:, None]", "self._lower[:, rows.battery] = 0.0",
-        (*QP, constant_demand),
+        (*QP, *NLP, constant_demand),
+        ("Optimum of the QP", "First command, on or off", "Predicted T_cl", "Constant demand"),
     ),
     Mutation(
         "cost of the stage after", StageQp, "update",
@@ -222,6 +224,12 @@ MUTATIONS = [
         "max(qp.terminal_low * soc_init", "max(0.99 * qp.terminal_low * soc_init", RENDERINGS,
         ("Matrices, c", "Optimum, c"),
     ),
+    # the nonlinear program
+    Mutation(
+        "IPOPT is taken to fail where it needs many iterations", NlpSolver, "_plan",
+        'bool(stats["success"])', 'int(stats["iter_count"]) < 12', NLP,
+        ("States without a plan",),
+    ),
     # backends
     Mutation(
         "one-sided rows with a side forgotten", OneSided, "right_sides",
@@ -257,6 +265,7 @@ def fewer(monkeypatch):
     monkeypatch.setattr(rendering_checks, "QUICK_EVERY", 150)
     monkeypatch.setattr(rendering_checks, "QUICK_RANDOM", 4)
     monkeypatch.setattr(backend_checks, "QUICK_BACKENDS", ("clarabel", "daqp", "qoco"))
+    monkeypatch.setattr(nlp_checks, "EVERY", 40)
 
 
 def failures(*checks: Callable[..., Any]) -> list[str]:
@@ -285,6 +294,7 @@ def test_mutation_is_caught(monkeypatch, mutation):
     quick = [check for group in GROUPS if group.quick for check in group.checks]
     assert set(mutation.checks) <= set(quick)
     mutate(monkeypatch, mutation)
+    monkeypatch.setattr(generated_qp, "SLICES", 10)  # what is wrong may never converge
     found = failures(*mutation.checks)
     assert found
     for name in mutation.noticed:

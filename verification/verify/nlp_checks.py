@@ -26,16 +26,18 @@ def plans_beside_the_nonlinear_program(context: Context) -> Iterator[Check]:
 
     for name in context.cycles if context.quick else cycle_names():
         found = compare_open_loop(load_cycle(name), context.vehicle, EVERY, context.settings)
-        result = found.summary()
-        states = f"{result['states']} states"
+        states = f"{len(found.pairs)} states"
         yield Check(
             f"States without a plan of mh-nlp, {name}",
             "IPOPT solves the nonlinear program to its tolerance in every state.",
             0.0,
             float(found.nlp_unsolved),
             "states",
-            f"of {result['states'] + found.nlp_unsolved}",
+            f"of {len(found.pairs) + found.nlp_unsolved}",
         )
+        if not found.pairs:
+            continue
+        result = found.summary()
         yield Check(
             f"First command, on or off, {name}",
             "Both programs want the engine on, or both want it off, in the second ahead.",
