@@ -1,0 +1,170 @@
+"""Instructions of every step of a real trip on this machine, counted by callgrind.
+
+The host library drives a cycle on the Python plant. Its inputs are recorded, and the same library
+gets them again under callgrind, from a C program that does nothing else.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from qpmpc.codegen import generated_controller
+from qpmpc.codegen.generate import Precision, project_files
+from qpmpc.codegen.host_library import compiled, compiler
+from qpmpc.controllers.base import Decision, Observation
+from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.cycles import Cycle, load_cycle
+from qpmpc.preview import Trace
+from qpmpc.results import Run
+from qpmpc.simulate import simulate
+from qpmpc.vehicle import Plant, Vehicle, load_vehicle
+
+TOOLS = {"a C compiler": compiler(), "valgrind": shutil.which("valgrind")}
+MISSING = [name for name, found in TOOLS.items() if found is None]
+pytestmark = pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}")
+
+VEHICLE = load_vehicle()
+
+# replay PREPARED: inputs from standard input, outputs to standard output
+REPLAY_C = """
+#include <stdio.h>
+#include <stdlib.h>
+#include "mpc.h"
+static mpc_state state;
+int main(int argc, char **argv)
+{
+    int departing = atoi(argv[argc - 1]);
+    mpc_in in;
+    mpc_out out;
+    mpc_init(&state);
+    while (fread(&in, sizeof in, 1, stdin) == 1) {
+        while (departing) {
+            departing = (mpc_depart(&state, &in) > 0);
+        }
+        mpc_step(&state, &in, &out);
+        fwrite(&out, sizeof out, 1, stdout);
+    }
+    return 0;
+}
+"""
+
+
+class Recorder:
+    """The generated controller of a trip; what goes in and comes out is kept as bytes."""
+
+    name = "mh-qp"
+
+    def __init__(
+        self, trip: Cycle, vehicle: Vehicle, settings: ControllerSettings, precision: Precision
+    ) -> None:
+        trace = Trace.of(trip, vehicle)
+        self.controller = generated_controller(
+            Plant(vehicle), trace, settings=settings, precision=precision
+        )
+        self.solver_name = self.controller.solver_name
+        self.inputs, self.outputs = bytearray(), bytearray()
+
+    def decide(self, seen: Observation) -> Decision:
+        decision = self.controller.decide(seen)
+        self.inputs += bytes(self.controller._in)
+        self.outputs += bytes(self.controller._out)
+        return decision
+
+
+def counted(
+    trip: Cycle,
+    overrides: dict[str, object] | None = None,
+    vehicle: Vehicle = VEHICLE,
+    precision: Precision = "f64",
+) -> tuple[NDArray[np.int64], Run]:
+    """Drive a trip; return the instructions of each call of mpc_step, and the run."""
+    settings = ControllerSettings().with_settings(overrides or {})
+    recorder = Recorder(trip, vehicle, settings, precision)
+    run = simulate(trip, recorder, vehicle)
+    project = project_files(recorder.controller.library.values, "host", precision)
+    with TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        for name in ("mpc.h", "mpc_state.h", "mpc_config.h"):
+            (folder / name).write_text(project[name])
+        (folder / "replay.c").write_text(REPLAY_C)
+        build = [compiler(), "-std=c99", "-o", "replay", "replay.c", compiled(project)]
+        subprocess.run(build, cwd=folder, check=True)
+        replay = subprocess.run(
+            [
+                "valgrind",
+                "--tool=callgrind",
+                "--callgrind-out-file=count",
+                "--toggle-collect=mpc_step",  # only from its entry to its return
+                "--dump-after=mpc_step",  # one file a call: count.1, count.2, ...
+                "./replay",
+                str(int(settings.mh_qp.prepared)),
+            ],
+            cwd=folder,
+            input=recorder.inputs,
+            capture_output=True,
+            check=True,
+            # else the first step would include looking up the functions of the C library
+            env=os.environ | {"LD_BIND_NOW": "1"},
+        )
+        check_same_commands(recorder, replay.stdout)
+        counts = [total(folder / f"count.{k}") for k in range(1, trip.steps + 1)]
+    return np.array(counts), run
+
+
+def check_same_commands(recorder: Recorder, replayed: bytes) -> None:
+    """What is counted is what drove; to a watt, as valgrind does not fuse products everywhere."""
+    assert len(replayed) == len(recorder.outputs)
+    kind = recorder.controller.library.output_type
+    drove, replay = (np.frombuffer(data, dtype=kind) for data in (recorder.outputs, replayed))
+    for name in ("engine_on", "rung", "flags", "iterations"):
+        np.testing.assert_array_equal(replay[name], drove[name])
+    np.testing.assert_allclose(replay["p_eng_w"], drove["p_eng_w"], rtol=0.0, atol=1.0)
+
+
+def total(file: Path) -> int:
+    """Instructions of one of callgrind's files."""
+    found = re.search(r"^totals: (\d+)$", file.read_text(), re.MULTILINE)
+    assert found, file
+    return int(found[1])
+
+
+@pytest.mark.parametrize("t_cl_init_degc", [50.0, 88.0])
+def test_instructions_vary_by_less_than_one_percent_over_a_trip(t_cl_init_degc) -> None:
+    """Thermostat closed in the whole trip; and open at first, which takes exponentials."""
+    vehicle = VEHICLE.with_settings({"trip.t_cl_init_degc": t_cl_init_degc})
+    trip = load_cycle("nycc")
+    counts, run = counted(trip, vehicle=vehicle)
+    is_open = run.trajectory.t_cl_degc[:-1] > vehicle.thermal.thermostat_open_degc
+    assert not is_open[-1]
+    assert is_open[0] == (t_cl_init_degc == 88.0)
+    assert len(counts) == trip.steps
+    assert np.ptp(counts) < 0.01 * np.median(counts)
+
+
+def test_instructions_are_a_fixed_part_a_part_a_stage_and_a_part_a_stage_and_iteration() -> None:
+    """I = a + n (b + c K): three small builds give a, b and c, the default build obeys them."""
+    whole = load_cycle("nycc")
+    trip = Cycle.from_samples("start", whole.time_s[:9], whole.speed_mps[:9])
+    horizon = ControllerSettings().mh_qp.horizon
+    builds = [(10, 2), (50, 2), (10, 7), (50, 7)]  # iterations K, blocks
+    assert horizon.blocks == 7
+    rows, instructions = [], []
+    for k, blocks in builds:
+        size: dict[str, object] = {
+            "mh_qp.prepared": False,
+            "mh_qp.osqp.iterations": k,
+            "mh_qp.horizon.blocks": blocks,
+        }
+        stages = horizon.short_stages + horizon.classes * blocks
+        rows.append([1.0, stages, stages * k])
+        instructions.append(float(np.median(counted(trip, size)[0])))
+    parts = np.linalg.solve(rows[:3], instructions[:3])
+    assert (parts > 0.0).all()
+    assert instructions[3] == pytest.approx(np.dot(rows[3], parts), rel=0.01)
