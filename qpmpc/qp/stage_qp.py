@@ -45,7 +45,7 @@ class QpSettings(BaseModel):
     terminal_low: Annotated[float, Field(gt=0.0, le=1.5)] = 1.0
     terminal_high: Annotated[float, Field(gt=0.0, le=1.5)] = 1.01
     soc_penalty_g: Annotated[float, Field(ge=0.0)] = 0.0
-    soc_reserve: Annotated[float, Field(ge=0.0, le=0.9)] = 0.4
+    soc_reserve: Annotated[float, Field(ge=0.0, le=0.9)] = 0.42
     t_cl_margin_k: Annotated[float, Field(ge=0.0, le=10.0)] = 0.5
     slack_g_per_k: Weight = 10.0
     regularisation: Annotated[float, Field(ge=0.0, le=1.0)] = 1e-5
