@@ -35,6 +35,8 @@ SOC_SHORTFALL_G = 5000.0  # price of a unit of SOC missed, over ten times its wo
 WASTE_G = 0.01  # price of 0.01 of SOC thrown away, far below its worth: keeps SOC determined
 # g per stage, on squared power, on-share and slack in solver units
 REGULARISATION, MASKED_REGULARISATION = 1e-6, 1e-3
+THERMOSTAT_STEPS = 8  # of a long stage; measured: 0.2 K in the mean at 200 s, 0.03 K at 90 s
+NO_DIVISION_BY_ZERO = 1e-9
 POWER_GAP_W = 10.0  # least distance of the limits of engine power
 
 
@@ -58,8 +60,8 @@ class NlpProblem:
     - SOC_k <= SOC_{k-1} - h_k/C_bat [sigma_k I(SOC, P0_k - P_k) + (1 - sigma_k) I_off,k(SOC)]
       (paper eq. 1; smaller where the friction brakes take what a full battery cannot), with
       U I_off = l_k + G(SOC, P0_k) - G(SOC_init, P0_k) and l_k the stage's mean off-power
-    - C (T_k - T_{k-1}) = h_k [(1 - x)(LHV alpha(T) F_k - E_k) - UA(v_k)(T - T_amb)
-      - Q_rad(T_k) - Q_heat(T)] (eq. 3) with F = sigma f(P), E = sigma P
+    - C dT/dt = (1 - x)(LHV alpha(T) F_k - E_k) - UA(v_k)(T - T_amb) - Q_heat(T) - Q_rad (eq. 3)
+      with F = sigma f(P), E = sigma P; Q_rad follows T within the stage
     - the limits of eqs. (9)-(11), T and SOC without index being the mean over the stage
 
     The variables are sigma and D with P = P_least + D / sigma: in this perspective form the program
@@ -92,7 +94,12 @@ class NlpProblem:
         on_off_g = ca.MX.sym("on_off_g")
         x = z * ca.repmat(ca.DM(UNIT), 1, n)
         before = ca.horzcat(state, x[: NlpVar.T_CL + 1, :-1])
-        fuel_g, soc_gain, t_cl_gap = self._stage().map(n)(before, x, road)
+        parts = []
+        for inside, steps in ((slice(short_stages), 1), (slice(short_stages, n), THERMOSTAT_STEPS)):
+            if count := len(range(n)[inside]):
+                stage = self._stage(steps).map(count)
+                parts.append(stage(before[:, inside], x[:, inside], road[:, inside]))
+        fuel_g, soc_gain, t_cl_gap = (ca.horzcat(*part) for part in zip(*parts, strict=True))
         sigma = x[NlpVar.ON, :]
         short = sigma[:, :short_stages]
         cost = ca.sum2(fuel_g) + self.settings.slack_g_per_k * ca.sum2(x[NlpVar.T_SLACK, :])
@@ -120,7 +127,7 @@ class NlpProblem:
         }
         self._row_lower, self._row_upper = self._row_bounds()
 
-    def _stage(self) -> Any:
+    def _stage(self, thermostat_steps: int) -> Any:
         """One stage: (SOC and T before, variables, road) -> fuel g, SOC surplus, coolant gap."""
         ca, maps, vehicle = casadi(), self._maps, self.vehicle
         th = vehicle.thermal
@@ -139,11 +146,27 @@ class NlpProblem:
         lhv_j_per_g = vehicle.engine.lhv_j_per_g
         heat = (1.0 - th.exhaust_share) * (lhv_j_per_g * fuel - sigma * power)
         heat -= (th.ua0_w_per_k + th.ua1_w_per_k_per_mps * speed_mps) * (t_cl - th.t_amb_degc)
-        # the thermostat settles within a long stage: at its mean it would open too late
-        heat -= maps.radiator_w(x[NlpVar.T_CL]) + maps.cabin_w(t_cl)
+        heat -= maps.cabin_w(t_cl)
         soc_gain = before[0] - h * current / (3600.0 * vehicle.battery.capacity_ah) - x[NlpVar.SOC]
-        t_cl_gap = before[1] + h * heat / th.heat_capacity_j_per_k - x[NlpVar.T_CL]
+        t_cl_gap = self._coolant_after(before[1], h, heat, thermostat_steps) - x[NlpVar.T_CL]
         return ca.Function("stage", [before, x, road], [h * fuel, soc_gain, t_cl_gap])
+
+    def _coolant_after(self, t_cl_degc: Any, h: Any, heat_w: Any, steps: int) -> Any:
+        """T after a stage of constant heat, the thermostat opening or closing on the way.
+
+        C dT/dt = q - Q_rad(T), each of the steps exact for Q_rad linear about its start: stable
+        however long it is.
+        """
+        ca, capacity = casadi(), self.vehicle.thermal.heat_capacity_j_per_k
+        at = ca.SX.sym("at")
+        radiator = self._maps.radiator_w(at)
+        radiator_and_slope = ca.Function("radiator", [at], [radiator, ca.gradient(radiator, at)])
+        step = h / steps
+        for _ in range(steps):
+            taken_w, slope = radiator_and_slope(t_cl_degc)
+            share = step * slope / capacity + NO_DIVISION_BY_ZERO
+            t_cl_degc += -ca.expm1(-share) / share * step * (heat_w - taken_w) / capacity
+        return t_cl_degc
 
     def _row_bounds(self) -> tuple[Floats, Floats]:
         """Bounds of the rows, but for the lower limits of SOC, which change."""

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from qpmpc.controllers.base import Observation
@@ -24,6 +26,8 @@ from qpmpc.verification.nlp_comparison import compare, compare_open_loop
 from qpmpc.verification.nlp_maps import RoundedTable, SmoothMaps
 from qpmpc.verification.nlp_problem import NlpVar
 from qpmpc.verification.nlp_solver import NlpPlan
+
+Floats = NDArray[np.float64]
 
 VEHICLE = load_vehicle()
 EQUATIONS = Equations(VEHICLE)
@@ -88,14 +92,19 @@ def test_rounded_table_keeps_convexity_and_ends() -> None:
 def _surplus_k(
     end: float, equations: Equations, begin: float, h: float, heating: tuple[float, float, float]
 ) -> float:
-    """Imbalance of eq. (3) over a stage, K, the thermostat being where the stage ends."""
+    """Imbalance of eq. (3) over a stage, K, the thermostat following the coolant within it."""
     fuel, power, speed_mps = heating
     th, mean = equations.vehicle.thermal, 0.5 * (begin + end)
     burnt_w = equations.lhv_j_per_g * float(equations.alpha(mean)) * fuel
     heat = (1.0 - th.exhaust_share) * (burnt_w - power)
     heat -= float(equations.ua_w_per_k(speed_mps)) * (mean - th.t_amb_degc)
-    heat -= float(equations.radiator_w(end) + equations.cabin_w(mean))
-    return begin + h * heat / th.heat_capacity_j_per_k - end
+    heat -= float(equations.cabin_w(mean))
+
+    def rise(_: float, t_cl: Floats) -> Floats:
+        return (heat - equations.radiator_w(t_cl)) / th.heat_capacity_j_per_k
+
+    after = solve_ivp(rise, (0.0, h), [begin], rtol=1e-6, atol=1e-6).y[0, -1] if h else begin
+    return float(after) - end
 
 
 def rolled(vehicle: Vehicle, plan: NlpPlan, soc: float, t_cl: float) -> tuple[float, float, float]:
