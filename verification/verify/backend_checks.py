@@ -20,7 +20,8 @@ QUICK_BACKENDS = ("osqp", "piqp", "clarabel", "daqp", "qoco")  # the others take
 QUICK_TRIP = "city"  # of the problem set
 TOLERANCE = 1e-8  # that solvers are asked for, in their own measures
 AGREE = 1e-6  # relative cost
-LOOSE = {"osqp": 1e-4, "scs": 1e-5, "highs": 1e-5}  # first-order, or stopping at larger residuals
+# first-order, or stopping at larger residuals
+LOOSE = {"osqp": 1e-4, "scs": 1e-5, "highs": 1e-5, "proxqp": 1e-5}
 RESIDUAL, LOOSE_RESIDUAL = 1e-5, {"osqp": 1e-3, "scs": 1e-2}  # of the largest dual
 CYCLING = ("highs",)  # see `qpmpc.solvers.highs`
 # As in a car it makes 50 iterations, from a warm start, and need not say when it is done

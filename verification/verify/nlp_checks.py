@@ -74,7 +74,7 @@ def plans_beside_the_nonlinear_program(context: Context) -> Iterator[Check]:
             ),
             (
                 "Planned fuel",
-                "In 95 % of states both plan the same fuel to arrival, relative to the whole trip's.",
+                "In 95 % of states both plan the same fuel to arrival, relative to the trip's.",
                 "planned_fuel_percent",
                 "p95",
                 PLANNED_FUEL_PERCENT,
