@@ -113,7 +113,7 @@ def against_the_nonlinear_program(context: Context) -> Iterator[Check]:
             TIME_SHARE,
             both.time_ratio["median"],
             "",
-            "; ".join(times),
+            "; ".join([*times, f"{qp['solver']['name']} and {nlp['solver']['name']}"]),
         )
 
 
