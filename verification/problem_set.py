@@ -22,7 +22,7 @@ Kind = Literal["ordinary", "degenerate", "infeasible"]
 CITY, CITY_S = "nycc", 150
 HIGHWAY, HIGHWAY_S = "hwfet", 120
 COLD_MARGIN_K = 0.2  # above the coolant's lower limit, so that its slack comes into use
-BARELY = 0.1  # solver units beyond what can be reached: 0.1 K, 1 kW, 0.1 % of SOC
+BARELY = 0.1  # solver units beyond what can be reached: some 0.1 % of SOC, 0.1 K
 INSIDE = 1e-6  # solver units: room left, a hundred times what solvers are asked for
 THIRD = 2  # a stage under way
 
