@@ -144,7 +144,7 @@ def generated_controller(
     forecast = forecast or truth
     of_mpc, vehicle = settings.mh_qp, plant.vehicle
     preview = StageBuilder(vehicle, truth, forecast, of_mpc.horizon)
-    blocks = of_mpc.horizon.blocks or of_mpc.horizon.block_count(forecast.steps)
+    blocks = of_mpc.horizon.block_count(forecast.steps)
     library = build_host_library(values_of(vehicle, of_mpc, settings.rule_based, blocks), precision)
     start = None
     if of_mpc.prepared:

@@ -155,12 +155,28 @@ def compiled(files: Mapping[str, str]) -> Path:
     for name, text in files.items():
         digest.update(f"{name}\0{text}\0".encode())
     kept = _cache_folder() / f"{digest.hexdigest()[:24]}.so"
-    if not kept.exists():
+    if not _loads(kept):
         _build(files, command, kept)
     return kept
 
 
+def _loads(file: Path) -> bool:
+    """Whether the file is there and whole."""
+    if not file.exists():
+        return False
+    try:
+        ctypes.CDLL(str(file))
+    except OSError:
+        return False
+    return True
+
+
 def _cache_folder() -> Path:
+    chosen = os.environ.get("QPMPC_CACHE_DIR")
+    if chosen:
+        folder = Path(chosen) / "compiled"
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     folder = Path(base) / "qpmpc-iptm"
     try:
@@ -187,6 +203,10 @@ def _build(files: Mapping[str, str], command: str, kept: Path) -> None:
             text=True,
             check=False,
         )
-        if result.returncode:
-            raise CodegenError(f"{command} failed: {result.stderr.strip().splitlines()[:1]}")
-        (folder / "libmpc.so").replace(kept)
+        made = folder / "libmpc.so"
+        if result.returncode or not _loads(made):
+            first = next(iter(result.stderr.strip().splitlines()), "no library came of it")
+            raise CodegenError(
+                f"C compiler {command} failed: {first}; mh_qp.solver=osqp does without"
+            )
+        made.replace(kept)

@@ -86,12 +86,13 @@ def _mh_qp(plant: Plant, truth: Trace, forecast: Trace, s: ControllerSettings) -
     solver = s.mh_qp.solver
     if solver != "osqp":
         # here, as it imports this module
-        from qpmpc.codegen import compiler, generated_controller
+        from qpmpc.codegen import CodegenError, compiler, generated_controller
 
         if solver == "generated" or compiler() is not None:
             try:
                 return generated_controller(plant, truth, forecast, s)
-            except InputError:  # a setting that generated code does not have
+            # a setting that generated code does not have, or a compiler that is none
+            except (InputError, CodegenError):
                 if solver == "generated":
                     raise
     return MhQp("mh-qp", plant, truth, forecast, s.mh_qp, s.rule_based)

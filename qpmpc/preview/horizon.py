@@ -32,7 +32,12 @@ class HorizonSettings(BaseModel):
         return -(-trip_steps // self.blocks) if self.blocks else self.block_s
 
     def block_count(self, trip_steps: int) -> int:
-        """Number of blocks for a trip of that many 1 s steps."""
+        """Number of blocks for a trip of that many 1 s steps; the last may be empty.
+
+        Where it is set it is kept whatever the trip, as generated code has it.
+        """
+        if self.blocks:
+            return self.blocks
         length_s = self.block_length_s(trip_steps)
         return -(-trip_steps // length_s) if length_s else 0
 

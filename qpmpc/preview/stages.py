@@ -65,8 +65,9 @@ class StageBuilder:
         self._cumulative = _cumulative(forecast, vehicle, demand_class, settings.classes)
         block_s = settings.block_length_s(forecast.steps)
         self.count = settings.stage_count(forecast.steps)
-        self._block_start = np.arange(settings.block_count(forecast.steps)) * block_s
-        self._block_end = np.minimum(self._block_start + block_s, forecast.steps)
+        start = np.arange(settings.block_count(forecast.steps)) * block_s
+        self._block_start = np.minimum(start, forecast.steps)
+        self._block_end = np.minimum(start + block_s, forecast.steps)
 
     def at(self, step: int) -> Stages:
         """Return the stages of the horizon that starts at time step `step`."""

@@ -2,18 +2,21 @@
 
 import ctypes
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
-from qpmpc.codegen import GeneratedController, generated_controller
+from qpmpc.codegen import CodegenError, GeneratedController, generated_controller
 from qpmpc.codegen.host_library import compiler
 from qpmpc.codegen.values import CONSTANTS
 from qpmpc.controllers.base import Decision, Observation
 from qpmpc.controllers.factory import ControllerSettings, make_controller
 from qpmpc.controllers.mh_qp import MhQp
 from qpmpc.controllers.planner import FAILURES_FORGIVEN, WARM_UP_STEPS
-from qpmpc.cycles import load_cycle
+from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.errors import InputError
 from qpmpc.preview import StageBuilder, Trace
 from qpmpc.preview.stages import Stages
@@ -323,8 +326,48 @@ def test_default_is_generated_c_where_it_can_be_and_osqp_elsewhere(monkeypatch) 
     assert solver_name(**no_blocks) == "osqp"
     with pytest.raises(InputError, match="blocks"):
         solver_name(mh_qp__solver="generated", **no_blocks)
-    monkeypatch.setattr("qpmpc.codegen.compiler", lambda: None)
-    assert solver_name() == "osqp"
+    with monkeypatch.context() as patch:
+        patch.setattr("qpmpc.codegen.compiler", lambda: None)
+        assert solver_name() == "osqp"
+
+
+def test_a_compiler_that_fails_is_named_and_the_default_does_without(monkeypatch, tmp_path) -> None:
+    plant = Plant(VEHICLE)
+    trace = Trace.of(load_cycle("nycc"), VEHICLE)
+    monkeypatch.setenv("QPMPC_CACHE_DIR", str(tmp_path))
+    for broken in ("/bin/false", "/bin/true"):
+        monkeypatch.setenv("CC", broken)
+        assert make_controller("mh-qp", plant, trace).solver_name == "osqp"
+        with pytest.raises(CodegenError, match=f"{broken} failed: .*mh_qp.solver=osqp"):
+            generated_controller(plant, trace)
+    assert not list((tmp_path / "compiled").iterdir())
+
+
+def test_a_damaged_library_in_the_cache_is_built_again(tmp_path) -> None:
+    # in processes of their own: one that has loaded a file takes it for loaded ever after
+    trip = tmp_path / "trip.csv"
+    trip.write_text("time_s,speed_mps\n" + "".join(f"{t},10\n" for t in range(8)))
+    command = [sys.executable, "-m", "qpmpc", "simulate", str(trip), "--json", "-"]
+    environment = os.environ | {"QPMPC_CACHE_DIR": str(tmp_path / "cache")}
+    for _ in range(2):
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        assert "generated f64" in done.stdout
+        (library,) = (tmp_path / "cache" / "compiled").iterdir()
+        assert library.stat().st_size > 1000
+        library.write_bytes(b"")
+
+
+# 30 s are cut into blocks of 5 s: six of them, and an empty seventh, in C as in Python.
+def test_trip_too_short_for_its_blocks() -> None:
+    speed_mps = load_cycle("nycc").speed_mps[488:519]  # from stop to stop
+    assert speed_mps[0] == speed_mps[-1] == 0.0
+    short = Cycle("short", np.arange(31.0), speed_mps, np.zeros(31))
+    trace, plant = Trace.of(short, VEHICLE), Plant(VEHICLE)
+    fuel = [
+        simulate(short, make_controller("mh-qp", plant, trace, settings=chosen), VEHICLE).fuel_g
+        for chosen in (settings_of(), settings_of(mh_qp__solver="osqp"))
+    ]
+    assert fuel[0] == pytest.approx(fuel[1], rel=1e-6)
 
 
 def test_reset_on_the_road_costs_the_same_warm_up_as_in_python() -> None:
