@@ -46,6 +46,16 @@ class Outcome(NamedTuple):
     out: str
     err: str
 
+    def assert_refused(self, *words: str) -> None:
+        """Bad input: exit code 2, and one line with these words."""
+        assert self.code == 2
+        assert self.out == ""
+        assert self.err.startswith("qpmpc: ")
+        assert self.err.count("\n") == 1
+        assert self.err.endswith("\n")
+        for word in words:
+            assert word in self.err
+
 
 @pytest.fixture
 def trip(tmp_path: Path) -> Path:

@@ -106,12 +106,7 @@ def test_writing_again_replaces_its_files_and_leaves_others_alone(cli, tmp_path)
 def test_bad_input_is_one_line_and_nothing_is_written(cli, tmp_path, monkeypatch, args, words):
     monkeypatch.chdir(tmp_path)
     Path("file").write_text("not a folder")
-    done = cli("codegen", *args)
-    assert (done.code, done.out) == (2, "")
-    assert done.err.startswith("qpmpc: ")
-    assert done.err.count("\n") == 1
-    for word in words:
-        assert word in done.err
+    cli("codegen", *args).assert_refused(*words)
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
     assert Path("file").read_text() == "not a folder"
 

@@ -11,16 +11,6 @@ import qpmpc.runners
 from qpmpc.cli import main
 
 
-def assert_refused(done, *words):
-    assert done.code == 2
-    assert done.out == ""
-    assert done.err.startswith("qpmpc: ")
-    assert done.err.count("\n") == 1
-    assert done.err.endswith("\n")
-    for word in words:
-        assert word in done.err
-
-
 def files(folder: Path) -> dict[str, bytes]:
     return {str(f): f.read_bytes() for f in folder.rglob("*") if f.is_file()}
 
@@ -69,7 +59,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(cli, tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     Path("file").write_text("not a folder")
     before = files(tmp_path)
-    assert_refused(cli(*args), *words)
+    cli(*args).assert_refused(*words)
     assert files(tmp_path) == before
 
 
@@ -80,30 +70,30 @@ def test_bad_input_is_one_line_and_nothing_is_written(cli, tmp_path, monkeypatch
 def test_bad_trip(cli, tmp_path, rows):
     file = tmp_path / "trip.csv"
     file.write_text(rows)
-    assert_refused(cli("simulate", file, "--out", tmp_path / "out"), "trip.csv")
+    cli("simulate", file, "--out", tmp_path / "out").assert_refused("trip.csv")
     assert not (tmp_path / "out").exists()
 
 
 def test_bad_vehicle_file(cli, trip, tmp_path):
     file = tmp_path / "car.toml"
     file.write_text("name = 'x'\n")
-    assert_refused(cli("simulate", trip, "--vehicle", file), "car.toml", "chassis")
+    cli("simulate", trip, "--vehicle", file).assert_refused("car.toml", "chassis")
     file.write_text("name = = 'x'\n")
-    assert_refused(cli("simulate", trip, "--vehicle", file), "car.toml", "TOML")
+    cli("simulate", trip, "--vehicle", file).assert_refused("car.toml", "TOML")
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_folder_without_permission(cli, trip, tmp_path):
     folder = tmp_path / "locked"
     folder.mkdir(mode=0o500)
-    assert_refused(cli("simulate", trip, "--out", folder / "results"), "permission")
+    cli("simulate", trip, "--out", folder / "results").assert_refused("permission")
 
 
 @pytest.mark.parametrize(("name", "package"), [("dp", "numba"), ("mh-nlp", "casadi")])
 def test_missing_package_is_found_before_any_run(cli, trip, monkeypatch, name, package):
     monkeypatch.setitem(sys.modules, package, None)
     done = cli("compare", trip, "--controllers", f"mh-qp,{name}")
-    assert_refused(done, name, package, "qpmpc-iptm[verification]")
+    done.assert_refused(name, package, "qpmpc-iptm[verification]")
 
 
 def test_anything_else_is_one_line_and_exit_code_1(cli, trip, tmp_path, monkeypatch):
@@ -144,13 +134,16 @@ def test_interrupt(cli, trip, monkeypatch):
     assert done.err == "qpmpc: interrupted\n"
 
 
-def test_interrupt_reaches_a_run_that_spends_its_time_in_the_solver(tmp_path):
+@pytest.mark.parametrize("solver", ["osqp", "generated"])
+def test_interrupt_reaches_a_run_that_spends_its_time_in_the_solver(tmp_path, solver):
     """OSQP catches the signal itself and would swallow it."""
     script = (
         "import os, signal, threading\n"
+        "import qpmpc.codegen, qpmpc.runners\n"  # some packages swallow it while they load
         "from qpmpc.cli import main\n"
         "threading.Timer(2.0, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
-        "main(['simulate', 'wltc-3b', '--set', 'mh_qp.osqp.iterations=5000'])\n"
+        "main(['simulate', 'wltc-3b', '--set', 'mh_qp.osqp.iterations=5000',"
+        f" '--set', 'mh_qp.solver={solver}'])\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path

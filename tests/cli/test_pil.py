@@ -118,12 +118,7 @@ def no_run(monkeypatch):
 def test_bad_input_is_one_line_and_nothing_is_written(cli, tmp_path, monkeypatch, args, words):
     monkeypatch.chdir(tmp_path)
     Path("file").write_text("not a folder")
-    done = cli("pil", *args)
-    assert (done.code, done.out) == (2, "")
-    assert done.err.startswith("qpmpc: ")
-    assert done.err.count("\n") == 1
-    for word in words:
-        assert word in done.err
+    cli("pil", *args).assert_refused(*words)
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
 
