@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from qpmpc.codegen.values import Sizes, Values
 from qpmpc.errors import InputError
 from qpmpc.qp.structure import VARS, QpStructure, Rows, Var
+from qpmpc.solvers.osqp import SAME_WORK
 
 PREFIX = "mpc_osqp_"
 FOLDER = "osqp"
@@ -105,12 +106,7 @@ def _set_up(values: Values) -> osqp.OSQP:
         A=pattern,
         l=np.zeros(rows),
         u=np.where(is_equality, 0.0, np.inf),
-        scaling=0,
-        adaptive_rho=False,
-        check_termination=0,
-        check_dualgap=False,
-        polishing=False,
-        verbose=False,
+        **SAME_WORK,
         max_iter=values.iterations,
         alpha=values.scalars["relaxation"],
         eps_abs=ANY_RESIDUAL,

@@ -197,7 +197,7 @@ def processor_in_the_loop(
     """
     settings = settings or ControllerSettings()
     of_mpc, plant, truth = settings.mh_qp, Plant(vehicle), Trace.of(cycle, vehicle)
-    blocks = of_mpc.horizon.blocks or of_mpc.horizon.block_count(truth.steps)
+    blocks = of_mpc.horizon.block_count(truth.steps)
     values = values_of(vehicle, of_mpc, settings.rule_based, blocks)
     preview = StageBuilder(vehicle, truth, truth, of_mpc.horizon)
     twin = MhQp("mh-qp", plant, truth, truth, of_mpc, settings.rule_based)

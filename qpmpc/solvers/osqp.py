@@ -14,6 +14,16 @@ from qpmpc.solvers.forms import hessian_matrix
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
+# Of OSQP's own: no scaling, which would differ from step to step, no adaptation, no early exit.
+SAME_WORK: dict[str, Any] = {
+    "scaling": 0,
+    "adaptive_rho": False,
+    "check_termination": 0,
+    "check_dualgap": False,
+    "polishing": False,
+    "verbose": False,
+}
+
 _STATUS = {
     "solved": Status.SOLVED,
     "solved inaccurate": Status.ITERATION_LIMIT,
@@ -59,7 +69,7 @@ class Osqp:
         self._hessian: Floats = np.empty(0)
 
     def setup(self, structure: QpStructure, data: QpData) -> None:
-        """Set up OSQP without its own scaling, which would differ from step to step."""
+        """Set up OSQP; the numbers are replaced in every solve."""
         self._solver = osqp.OSQP()
         self._iterations = self.settings.iterations
         self._hessian = data.hessian
@@ -69,12 +79,7 @@ class Osqp:
             A=structure.matrix_of(data.a_data),
             l=data.lower,
             u=data.upper,
-            scaling=0,
-            adaptive_rho=False,
-            check_termination=0,
-            check_dualgap=False,
-            polishing=False,
-            verbose=False,
+            **SAME_WORK,
             max_iter=self._iterations,
             rho=self.settings.rho,
             sigma=self.settings.sigma,
