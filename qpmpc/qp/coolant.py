@@ -112,7 +112,8 @@ def coolant_step(
     opens = (start < 0.0) & (straight > 0.0)
     closed_s = np.where(opens, -start * capacity / np.where(opens, heat_w, 1.0), 0.0)
     decay = np.exp(-(duration_s - closed_s) / tau)
-    after_line = aim * (1.0 - decay)
+    settled = -np.expm1(-(duration_s - closed_s) / tau)  # 1 - decay, exact for short stages too
+    after_line = aim * settled
     # the exponential, for as long as it is open; then the line, from u = 0
     curved = aim + (start - aim) * decay
     closes = (start >= 0.0) & (curved < 0.0)
@@ -127,9 +128,9 @@ def coolant_step(
     per_heat = np.select(
         cases,
         [
-            (1.0 - decay) / slope + decay * closed_s / capacity,
+            settled / slope + decay * closed_s / capacity,
             line_s / capacity + (1.0 + aim / shut) / slope,
-            (1.0 - decay) / slope,
+            settled / slope,
         ],
         duration_s / capacity,
     )
