@@ -68,7 +68,7 @@ def test_controllers_are_made_without_casadi() -> None:
         "print([name for name in sys.modules if 'mh_nlp' in name])\n"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert run.stdout.splitlines() == ["{'mh-nlp'}", "['qpmpc.verification.mh_nlp']"]
+    assert run.stdout.splitlines() == ["{'mh-nlp'}", "['qpmpc.verification.nonlinear.mh_nlp']"]
 
 
 def test_import_is_light() -> None:

@@ -47,9 +47,9 @@ def benchmark(
     console.print(benchmark_table(result.rows))
     if out is not None:
         from qpmpc.verification.benchmark.export import write_qps
+        from qpmpc.verification.benchmark.problem_set import problem_set
+        from qpmpc.verification.benchmark.recorder import record
         from qpmpc.verification.benchmark.report import write_benchmark
-        from qpmpc.verification.problem_set import problem_set
-        from qpmpc.verification.recorder import record
 
         write_benchmark(result, car, out)
         write_qps([record(trip, car) for trip in trips], problem_set(car), out)

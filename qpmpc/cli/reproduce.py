@@ -38,14 +38,14 @@ def reproduce(
     from qpmpc.cli.inputs import check_outputs, load_vehicle_and_settings
     from qpmpc.errors import InputError
     from qpmpc.runners import check_names
-    from qpmpc.verification.reproduce import Extent, job_count, run_study
+    from qpmpc.verification.reproduction import Extent, job_count, run_study
 
     car, settings = load_vehicle_and_settings(vehicle, set_)
     check_outputs(json_file, out)
     check_names(["dp"])
     if find_spec("matplotlib") is None:
         raise InputError("reproduce needs matplotlib: pip install 'qpmpc-iptm[plot,verification]'")
-    from qpmpc.verification.reproduce.report import study_data, write_report
+    from qpmpc.verification.reproduction.report import study_data, write_report
 
     extent = Extent.quick() if quick else Extent.full()
     with progress_bar(job_count(extent)) as bar:

@@ -42,7 +42,7 @@ def verify(
         raise InputError(
             f"qpmpc verify needs {', '.join(missing)}: pip install 'qpmpc-iptm[plot,verification]'"
         )
-    from qpmpc.verification.verify import (
+    from qpmpc.verification.checks import (
         Context,
         Results,
         run_checks,

@@ -111,7 +111,7 @@ def _ecms(plant: Plant, truth: Trace, forecast: Trace, s: ControllerSettings) ->
 
 
 def _mh_nlp(plant: Plant, truth: Trace, forecast: Trace, s: ControllerSettings) -> Controller:
-    from qpmpc.verification.mh_nlp import make_mh_nlp  # only here: it takes CasADi
+    from qpmpc.verification.nonlinear.mh_nlp import make_mh_nlp  # only here: it takes CasADi
 
     return make_mh_nlp(plant, truth, forecast, s)
 

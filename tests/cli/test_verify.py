@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-import qpmpc.verification.verify as package
-from qpmpc.verification.verify import Check, Group
-from qpmpc.verification.verify.physics_checks import constant_demand, engine_covers_demand
-from qpmpc.verification.verify.pwa_checks import bounds_hold
+import qpmpc.verification.checks as package
+from qpmpc.verification.checks import Check, Group
+from qpmpc.verification.checks.physics_checks import constant_demand, engine_covers_demand
+from qpmpc.verification.checks.pwa_checks import bounds_hold
 
 
 def wrong(context):

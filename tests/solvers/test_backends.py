@@ -11,8 +11,8 @@ from qpmpc.errors import InputError
 from qpmpc.qp.stage_qp import QpData
 from qpmpc.solvers import Osqp, OsqpSettings, Status, make_solver, solver_names
 from qpmpc.vehicle import load_vehicle
-from qpmpc.verification.kkt import kkt_residuals, objective
-from qpmpc.verification.recorder import RecordedQp, Recording, record
+from qpmpc.verification.benchmark.recorder import RecordedQp, Recording, record
+from qpmpc.verification.renderings.kkt import kkt_residuals, objective
 
 TOLERANCE = 1e-8
 NATIVE = tuple(name for name in solver_names() if name != "osqp")

@@ -14,9 +14,9 @@ from qpmpc.verification.benchmark.benchmark import Benchmark
 from qpmpc.verification.benchmark.candidates import Candidate, candidates
 from qpmpc.verification.benchmark.drive import drive
 from qpmpc.verification.benchmark.export import recorded_npz
+from qpmpc.verification.benchmark.recorder import record
 from qpmpc.verification.benchmark.report import write_benchmark
 from qpmpc.verification.benchmark.table import benchmark_table
-from qpmpc.verification.recorder import record
 
 VEHICLE = load_vehicle()
 

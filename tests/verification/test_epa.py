@@ -2,7 +2,7 @@
 
 import pytest
 
-from qpmpc.verification.epa import CASES, TOLERANCE, main, model_mpg
+from qpmpc.verification.checks.epa import CASES, TOLERANCE, main, model_mpg
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)

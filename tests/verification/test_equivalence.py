@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import qpmpc.verification.equivalence
+import qpmpc.verification.renderings.equivalence
 from qpmpc.codegen.host_library import compiler
 from qpmpc.controllers.factory import ControllerSettings
 from qpmpc.controllers.mh_qp import MhQp
@@ -16,12 +16,12 @@ from qpmpc.preview import Trace
 from qpmpc.qp import CvxpyTwin, Var
 from qpmpc.simulate import simulate
 from qpmpc.vehicle import Plant, Vehicle, load_vehicle
-from qpmpc.verification.cvxpy_matrices import cvxpy_matrices
-from qpmpc.verification.equivalence import Renderings, check_equivalence
-from qpmpc.verification.generated_qp import READ
-from qpmpc.verification.matrices import Matrices, difference, matrices_of
-from qpmpc.verification.qp_cases import QpCase, random_cases, recorded_cases
-from qpmpc.verification.recorder import RecordingSolver
+from qpmpc.verification.benchmark.recorder import RecordingSolver
+from qpmpc.verification.renderings.cvxpy_matrices import cvxpy_matrices
+from qpmpc.verification.renderings.equivalence import Renderings, check_equivalence
+from qpmpc.verification.renderings.generated_qp import READ
+from qpmpc.verification.renderings.matrices import Matrices, difference, matrices_of
+from qpmpc.verification.renderings.qp_cases import QpCase, random_cases, recorded_cases
 
 VEHICLE = load_vehicle()
 ROUNDING = 1e-12
@@ -115,7 +115,7 @@ def test_other_settings(vehicle_changes: dict[str, object], changes: dict[str, o
     ],
 )
 def test_c_that_differs_is_noticed(monkeypatch, file, old, new, part) -> None:
-    project_files = qpmpc.verification.generated_qp.project_files
+    project_files = qpmpc.verification.renderings.generated_qp.project_files
 
     def spoilt(*arguments: object) -> dict[str, str]:
         files = project_files(*arguments)
@@ -123,8 +123,9 @@ def test_c_that_differs_is_noticed(monkeypatch, file, old, new, part) -> None:
         files[file] = files[file].replace(old, new, 1)
         return files
 
-    monkeypatch.setattr(qpmpc.verification.generated_qp, "project_files", spoilt)
-    monkeypatch.setattr(qpmpc.verification.generated_qp, "SLICES", 30)  # it may never converge
+    generated_qp = qpmpc.verification.renderings.generated_qp
+    monkeypatch.setattr(generated_qp, "project_files", spoilt)
+    monkeypatch.setattr(generated_qp, "SLICES", 30)  # it may never converge
     renderings, cases = made()
     off = renderings.compare(cases[1])["c"]
     if part == "matrices":
@@ -141,7 +142,7 @@ def test_nothing_of_the_reader_is_in_a_generated_controller() -> None:
 
 
 def test_without_a_compiler_the_others_are_compared(monkeypatch) -> None:
-    monkeypatch.setattr(qpmpc.verification.equivalence, "compiler", lambda: None)
+    monkeypatch.setattr(qpmpc.verification.renderings.equivalence, "compiler", lambda: None)
     renderings, cases = made()
     assert set(renderings.compare(cases[0])) == {"cvxpy", "casadi"}
 

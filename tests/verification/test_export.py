@@ -17,9 +17,9 @@ from qpmpc.qp.structure import QpStructure
 from qpmpc.solvers import make_solver
 from qpmpc.vehicle import load_vehicle
 from qpmpc.verification.benchmark.export import write_qps
-from qpmpc.verification.kkt import objective
-from qpmpc.verification.problem_set import Problem, problem_set
-from qpmpc.verification.recorder import Recording, record
+from qpmpc.verification.benchmark.problem_set import Problem, problem_set
+from qpmpc.verification.benchmark.recorder import Recording, record
+from qpmpc.verification.renderings.kkt import objective
 
 VEHICLE = load_vehicle()
 STEPS = 45

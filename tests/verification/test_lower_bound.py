@@ -10,8 +10,8 @@ from qpmpc.errors import InputError
 from qpmpc.runners import run
 from qpmpc.simulate import simulate
 from qpmpc.vehicle import Command, Plant, load_vehicle
-from qpmpc.verification.lower_bound import lower_bound, stored_energy_j
-from qpmpc.verification.relaxed_trip import relaxed_trip
+from qpmpc.verification.bounds.lower_bound import lower_bound, stored_energy_j
+from qpmpc.verification.bounds.relaxed_trip import relaxed_trip
 
 VEHICLE = load_vehicle()
 STEPS = 150

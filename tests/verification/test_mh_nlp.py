@@ -20,12 +20,12 @@ from qpmpc.errors import QpmpcError
 from qpmpc.preview import Trace
 from qpmpc.simulate import simulate
 from qpmpc.vehicle import Plant, Vehicle, load_vehicle
-from qpmpc.verification.equations import Equations
-from qpmpc.verification.mh_nlp import MhNlp, MhNlpSettings, make_mh_nlp
-from qpmpc.verification.nlp_comparison import compare, compare_open_loop
-from qpmpc.verification.nlp_maps import RoundedTable, SmoothMaps
-from qpmpc.verification.nlp_problem import NlpVar
-from qpmpc.verification.nlp_solver import NlpPlan
+from qpmpc.verification.independent.equations import Equations
+from qpmpc.verification.nonlinear.comparison import compare, compare_open_loop
+from qpmpc.verification.nonlinear.maps import RoundedTable, SmoothMaps
+from qpmpc.verification.nonlinear.mh_nlp import MhNlp, MhNlpSettings, make_mh_nlp
+from qpmpc.verification.nonlinear.problem import NlpVar
+from qpmpc.verification.nonlinear.solver import NlpPlan
 
 Floats = NDArray[np.float64]
 

@@ -34,10 +34,7 @@ from qpmpc.solvers.osqp import Osqp
 from qpmpc.solvers.qoco import Qoco
 from qpmpc.vehicle import Plant
 from qpmpc.vehicle.engine import OptimalLine
-from qpmpc.verification import generated_qp
-from qpmpc.verification.casadi_qp import CasadiQp
-from qpmpc.verification.nlp_solver import NlpSolver
-from qpmpc.verification.verify import (
+from qpmpc.verification.checks import (
     GROUPS,
     Context,
     Group,
@@ -47,27 +44,30 @@ from qpmpc.verification.verify import (
     rendering_checks,
     run_checks,
 )
-from qpmpc.verification.verify.backend_checks import common_problems
-from qpmpc.verification.verify.balance_checks import books_balance, limits_kept
-from qpmpc.verification.verify.bound_checks import bound_below_everything
-from qpmpc.verification.verify.nlp_checks import (
+from qpmpc.verification.checks.backend_checks import common_problems
+from qpmpc.verification.checks.balance_checks import books_balance, limits_kept
+from qpmpc.verification.checks.bound_checks import bound_below_everything
+from qpmpc.verification.checks.nlp_checks import (
     against_the_nonlinear_program,
     plans_beside_the_nonlinear_program,
 )
-from qpmpc.verification.verify.physics_checks import (
+from qpmpc.verification.checks.physics_checks import (
     constant_demand,
     engine_covers_demand,
     thermostat_exact,
 )
-from qpmpc.verification.verify.pwa_checks import bounds_hold, trip_error_small
-from qpmpc.verification.verify.qp_checks import (
+from qpmpc.verification.checks.pwa_checks import bounds_hold, trip_error_small
+from qpmpc.verification.checks.qp_checks import (
     same_optimum,
     scaling_is_neutral,
     stages_agree,
     warm_start_shifted,
 )
-from qpmpc.verification.verify.relaxation_checks import expansion_small, relaxation_tight
-from qpmpc.verification.verify.rendering_checks import one_qp
+from qpmpc.verification.checks.relaxation_checks import expansion_small, relaxation_tight
+from qpmpc.verification.checks.rendering_checks import one_qp
+from qpmpc.verification.nonlinear.solver import NlpSolver
+from qpmpc.verification.renderings import generated_qp
+from qpmpc.verification.renderings.casadi_qp import CasadiQp
 
 pytestmark = pytest.mark.slow
 

@@ -6,9 +6,9 @@ import pytest
 from qpmpc.solvers import Osqp, QpSolver, Status, make_solver, solver_names
 from qpmpc.solvers.feasibility import is_infeasible
 from qpmpc.vehicle import load_vehicle
-from qpmpc.verification.kkt import objective
-from qpmpc.verification.problem_set import Problem, problem_set
-from qpmpc.verification.verify.backend_checks import AGREE, CYCLING, LOOSE, TO_THE_END
+from qpmpc.verification.benchmark.problem_set import Problem, problem_set
+from qpmpc.verification.checks.backend_checks import AGREE, CYCLING, LOOSE, TO_THE_END
+from qpmpc.verification.renderings.kkt import objective
 
 ACTIVE = 1e-6  # solver units
 

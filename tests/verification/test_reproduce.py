@@ -11,11 +11,11 @@ import pytest
 
 from qpmpc.controllers.factory import ControllerSettings
 from qpmpc.vehicle import load_vehicle
-from qpmpc.verification.reproduce import Extent, Study, job_count, paper, run_study
-from qpmpc.verification.reproduce.checks import checks_of
-from qpmpc.verification.reproduce.report import DATA, PAGE, write_report
-from qpmpc.verification.reproduce.thermal import thermal_story
-from qpmpc.verification.reproduce.variants import EXPERIMENTS, VARIANTS
+from qpmpc.verification.reproduction import Extent, Study, job_count, paper, run_study
+from qpmpc.verification.reproduction.checks import checks_of
+from qpmpc.verification.reproduction.report import DATA, PAGE, write_report
+from qpmpc.verification.reproduction.thermal import thermal_story
+from qpmpc.verification.reproduction.variants import EXPERIMENTS, VARIANTS
 
 pytestmark = pytest.mark.slow
 

@@ -1,0 +1,1 @@
+"""Lower bounds on the fuel of a trip that no controller can beat."""

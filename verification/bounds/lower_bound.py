@@ -1,0 +1,277 @@
+"""A lower bound on the fuel of a whole trip that holds for every controller on the plant.
+
+With W(SOC) = C_bat times the integral of U_oc, the energy in the battery, every run that keeps
+the limits and every price lam >= 0 of energy satisfy
+
+    fuel + lam (W_0 - W_n) >= L(lam) = min sum_k h [ alpha(T_k) f(p_k) + lam G(P_k) ]
+
+over all engine commands, with the coolant's dynamics kept and the SOC's left to its price
+(Lagrangian relaxation). `lower_bound` maximises L over lam. Where SOC_n >= SOC_0 the left side is
+at most the fuel, so that L is a lower bound on it. No convexity is assumed, nothing linearised.
+
+L(lam) is computed by dynamic programming over the coolant temperature alone; all its
+approximations err to the low side:
+
+- G(P) is the least internal power over soc_min..soc_max, less U' h I^2 / (2 C_bat), because the
+  plant takes U_oc at the start of its explicit step
+- the radiator is left out, and a full battery, start fuel and engine off at full demand cost
+  nothing; the cabin takes its least heat. A warmer coolant never costs more, so heat may be
+  thrown away, and what would exceed T_max is
+- T_min may be left by one grid cell, at the price that heat has at the edge
+- between the grid points in T and p the value is interpolated, and the most that this can be too
+  high is subtracted, action by action: a quarter of the convex kink of the value that lies in the
+  cell's image, the sag of alpha between temperatures and those of f and G between powers.
+  Other curvature only makes interpolation too low: the coolant's step rises with T, by less than
+  T, and is convex in it, as alpha is.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpmpc.cycles import Cycle
+from qpmpc.errors import InputError
+from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.verification.dynamic_programming.compiled import compiled
+from qpmpc.verification.independent.equations import Equations
+
+Floats = NDArray[np.float64]
+
+T_STEP_K = 0.1
+POWER_STEP_W = 250.0
+FINE_W = 25.0  # spacing at which f and G are sampled; divides the spacing of the fuel table
+SOC_POINTS = 401
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+FIRST_EFFICIENCY, LAST_EFFICIENCY = 0.25, 0.65  # of turning fuel into battery energy: lam's range
+PRICE_SEARCHES = 9
+
+
+@dataclass(frozen=True)
+class LowerBound:
+    """Bound of one trip.
+
+    Attributes
+    ----------
+    fuel_g : L; fuel + price (W_0 - W_n) of any run is at least this
+    price_g_per_j : lam
+    numerical_g : what was subtracted for interpolation; with a finer grid the bound would rise by
+        about this
+    """
+
+    fuel_g: float
+    price_g_per_j: float
+    numerical_g: float
+
+
+class _Tables(NamedTuple):
+    """What the recursion needs; the first power stands for the engine off."""
+
+    internal_w: Floats  # (steps, powers), infinite where not allowed
+    ua_w_per_k: Floats  # (steps,)
+    fuel_g_per_s: Floats  # (powers,)
+    power_w: Floats  # (powers,)
+    alpha: Floats  # (temperatures,)
+    t_degc: Floats  # (temperatures,)
+    alpha_sag: float
+    fuel_sag_g_per_s: Floats  # (powers,)
+    internal_sag_w: Floats  # (steps, powers)
+    kink_share: float
+    heat_k_per_g: float  # (1 - x) LHV / C
+    k_per_j: float  # 1 / C
+    work_share: float  # 1 - x
+    t_amb_degc: float
+    cabin_w: float
+
+
+def lower_bound(cycle: Cycle, vehicle: Vehicle) -> LowerBound:
+    """Compute max_lam L(lam), a lower bound on the fuel of any run with SOC_n >= SOC_0.
+
+    Parameters
+    ----------
+    cycle : what is driven
+    vehicle : the plant; the run starts at `vehicle.trip` and keeps the limits of SOC, coolant,
+        engine and battery
+
+    Raises
+    ------
+    InputError
+        If the trip starts outside the coolant limits, which the bound takes as kept throughout.
+    """
+    th, start = vehicle.thermal, vehicle.trip.t_cl_init_degc
+    if not th.t_cl_min_degc <= start <= th.t_cl_max_degc:
+        raise InputError(
+            f"vehicle {vehicle.name}: trip.t_cl_init_degc: the lower bound on fuel needs it within "
+            f"{th.t_cl_min_degc:g} .. {th.t_cl_max_degc:g} (given: {start:g})"
+        )
+    tables = _tables(cycle, vehicle)
+    lhv = vehicle.engine.lhv_j_per_kg * 1e-3
+    low, high = 1.0 / (LAST_EFFICIENCY * lhv), 1.0 / (FIRST_EFFICIENCY * lhv)
+
+    def bound(price: float, strict: float = 1.0) -> float:
+        value = _sweep(tables, price, strict)
+        # the value falls with T: the grid point above the start is a lower bound at it
+        node = int(np.searchsorted(tables.t_degc, start - 1e-9))
+        return float(value[min(node, len(value) - 1)])
+
+    # L is concave in lam: golden section
+    inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
+    found = [bound(inner[0]), bound(inner[1])]
+    for _ in range(PRICE_SEARCHES):
+        if found[0] < found[1]:
+            low = inner[0]
+            inner = [inner[1], low + GOLDEN * (high - low)]
+            found = [found[1], bound(inner[1])]
+        else:
+            high = inner[1]
+            inner = [high - GOLDEN * (high - low), inner[0]]
+            found = [bound(inner[0]), found[0]]
+    best = int(found[1] > found[0])
+    return LowerBound(found[best], inner[best], bound(inner[best], 0.0) - found[best])
+
+
+def stored_energy_j(vehicle: Vehicle, soc: float) -> float:
+    """W(SOC) = C_bat int U_oc dSOC from soc_min, exact for the tabulated U_oc."""
+    battery = vehicle.battery
+    between = [s for s in battery.soc_grid if min(battery.soc_min, soc) < s < max(0.0, soc)]
+    grid = np.array(sorted({battery.soc_min, *between, soc}))
+    voltage = Equations(vehicle).voltage_v(grid)
+    energy = float(np.sum(0.5 * (voltage[1:] + voltage[:-1]) * np.diff(grid)))
+    return 3600.0 * battery.capacity_ah * (energy if soc >= battery.soc_min else -energy)
+
+
+def _tables(cycle: Cycle, vehicle: Vehicle) -> _Tables:
+    equations = Equations(vehicle)
+    engine, battery, th = vehicle.engine, vehicle.battery, vehicle.thermal
+    count = int(np.ceil((th.t_cl_max_degc - th.t_cl_min_degc) / T_STEP_K))
+    temperature = np.linspace(th.t_cl_min_degc, th.t_cl_max_degc, count + 1)
+    alpha = equations.alpha(temperature)
+    middle = equations.alpha(0.5 * (temperature[1:] + temperature[:-1]))
+    # a chord of a convex curve is nowhere further above it than twice the gap in its middle
+    alpha_sag = 2.0 * float(np.max(0.5 * (alpha[1:] + alpha[:-1]) - middle))
+
+    on = np.linspace(0.0, engine.power_max_w, int(np.ceil(engine.power_max_w / POWER_STEP_W)) + 1)
+    on = np.unique(np.maximum(on, engine.power_min_w))
+    fine = np.arange(engine.power_min_w, engine.power_max_w + FINE_W, FINE_W)
+    fine = np.minimum(fine, engine.power_max_w)
+    fuel_on = equations.fuel_g_per_s(on)
+    bend = np.abs(np.interp(fine, on, fuel_on) - equations.fuel_g_per_s(fine))
+    near = np.abs(fine[None, :] - on[:, None]) <= POWER_STEP_W
+    fuel_sag = np.concatenate([[0.0], np.where(near, bend, 0.0).max(axis=1)])
+    power, fuel = np.concatenate([[0.0], on]), np.concatenate([[0.0], fuel_on])
+
+    least_w, most_w = -battery.power_charge_max_w, battery.power_discharge_max_w
+    samples = np.arange(least_w, most_w + 2.0 * FINE_W, FINE_W)
+    internal = _least_internal_w(vehicle, samples)
+    net = equations.net_w(cycle)
+    asked = net[:, None] - power
+    # With too little engine power the battery cannot drive: not allowed, except at the last
+    # power before the least that suffices.
+    allowed = asked <= most_w + POWER_STEP_W * (np.arange(len(power)) > 0)
+    terminal = np.clip(asked, least_w, most_w)
+    internal_sag = np.interp(terminal, samples, _internal_sag_w(internal))
+    # where the brakes take over, G stops falling: a kink that a chord may cut off
+    internal_sag += np.where(np.abs(asked - least_w) <= POWER_STEP_W, 0.25 * POWER_STEP_W, 0.0)
+    internal_sag[:, 0] = np.max(np.abs(np.diff(internal, 2)))  # off: no chord between powers
+    g = np.interp(terminal, samples, internal)
+    ua = equations.ua_w_per_k(0.5 * (cycle.speed_mps[1:] + cycle.speed_mps[:-1]))
+    k_per_j = 1.0 / th.heat_capacity_j_per_k
+    share = 1.0 - th.exhaust_share
+    heat = share * equations.lhv_j_per_g * k_per_j
+    steepest = float(np.max(np.diff(fuel_on) / np.diff(on)))
+    reach_k = POWER_STEP_W * max(heat * alpha.max() * steepest, share * k_per_j)
+    return _Tables(
+        internal_w=np.where(allowed, g, np.inf),
+        ua_w_per_k=ua,
+        fuel_g_per_s=fuel,
+        power_w=power,
+        alpha=alpha,
+        t_degc=temperature,
+        alpha_sag=alpha_sag,
+        fuel_sag_g_per_s=fuel_sag,
+        internal_sag_w=internal_sag,
+        kink_share=0.25 * (1.0 + reach_k / T_STEP_K),
+        heat_k_per_g=heat,
+        k_per_j=k_per_j,
+        work_share=share,
+        t_amb_degc=th.t_amb_degc,
+        cabin_w=float(equations.cabin_w(temperature).min()),
+    )
+
+
+def _least_internal_w(vehicle: Vehicle, power_w: Floats) -> Floats:
+    """Least energy a second that leaves the store at a terminal power, over the SOC range."""
+    equations, battery = Equations(vehicle), vehicle.battery
+    soc = np.linspace(battery.soc_min, battery.soc_max, SOC_POINTS)
+    soc = np.union1d(soc, [s for s in battery.soc_grid if soc[0] < s < soc[-1]])
+    internal = equations.internal_w(soc[:, None], power_w[None, :])
+    current = internal / equations.voltage_v(soc)[:, None]
+    steepest = max(float(np.max(np.diff(equations.voltage_v(soc)) / np.diff(soc))), 0.0)
+    least = internal - steepest * current**2 / (2.0 * equations.charge_c)
+    # between SOC samples G varies by less than between neighbours
+    return np.asarray(least.min(axis=0) - np.abs(np.diff(least, axis=0)).max(axis=0))
+
+
+def _internal_sag_w(internal_w: Floats) -> Floats:
+    """Most that chords of G, over power steps and between samples, can be above it; as samples.
+
+    A chord of width d is above a curve by at most d^2/8 times its largest curvature nearby, which
+    is the second difference at the samples' spacing, and a kink by at most d/4 times the bend.
+    """
+    width = round(POWER_STEP_W / FINE_W)
+    second = np.zeros_like(internal_w)
+    second[1:-1] = np.abs(np.diff(internal_w, 2))
+    padded = np.pad(second, width, mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * width + 1)
+    # d^2/8 f'' = width^2/8 second; the sum bounds both smooth parts and kinks
+    return np.asarray(windows.sum(axis=1) * width / 4.0 + second.max() / 8.0)
+
+
+@compiled
+def _sweep(tables: _Tables, price: float, strict: float) -> Floats:
+    """Value (temperatures,) at departure; `strict` 1 subtracts all interpolation errors, 0 none."""
+    internal, temperature, alpha = tables.internal_w, tables.t_degc, tables.alpha
+    steps, powers = internal.shape
+    points = len(temperature)
+    t_low, cell = temperature[0], temperature[1] - temperature[0]
+    value, following = np.zeros(points), np.zeros(points)
+    kink, worst = np.zeros(points), np.zeros(points)
+    alpha_sag_g = tables.fuel_g_per_s[powers - 1] * tables.alpha_sag
+    for k in range(steps - 1, -1, -1):
+        slope = 0.0
+        for i in range(points - 1):
+            slope = max(slope, (following[i] - following[i + 1]) / cell)
+        for i in range(1, points - 1):
+            kink[i] = max(following[i + 1] - 2.0 * following[i] + following[i - 1], 0.0)
+        kink[points - 1] = following[points - 2] - following[points - 1]  # flat beyond T_max
+        for i in range(points):
+            worst[i] = 0.0
+            for j in range(max(i - 1, 0), min(i + 3, points)):
+                worst[i] = max(worst[i], kink[j])
+        bend = alpha[0] * (1.0 + slope * tables.heat_k_per_g)
+        fixed = strict * alpha_sag_g
+        for i in range(points):
+            lost_w = tables.ua_w_per_k[k] * (temperature[i] - tables.t_amb_degc) + tables.cabin_w
+            cool = temperature[i] - tables.k_per_j * lost_w
+            best = np.inf
+            for j in range(powers):
+                if internal[k, j] == np.inf:
+                    continue
+                fuel_g = alpha[i] * tables.fuel_g_per_s[j]
+                work_k = tables.k_per_j * tables.work_share * tables.power_w[j]
+                place = (cool + tables.heat_k_per_g * fuel_g - work_k - t_low) / cell
+                if place < -1.0:
+                    continue
+                place = min(place, points - 1.0)
+                node = min(max(int(np.floor(place)), 0), points - 2)
+                along = (place - node) * (following[node + 1] - following[node])
+                cost_g = fuel_g + price * internal[k, j] + following[node] + along
+                sag_g = price * tables.internal_sag_w[k, j] + bend * tables.fuel_sag_g_per_s[j]
+                best = min(best, cost_g - strict * (sag_g + tables.kink_share * worst[node]))
+            value[i] = best - fixed
+        for i in range(1, points):
+            value[i] = min(value[i], value[i - 1])
+        for i in range(points):
+            following[i] = value[i]
+    return value

@@ -1,0 +1,107 @@
+"""Sanity of the plant: the rules on EPA's cycles beside EPA's dynamometer figures.
+
+Run it with ``python -m qpmpc.verification.checks.epa``. EPA's figures are unadjusted miles per
+gallon from its test-car list for the 2016 Prius; the plant was fitted to them with few free
+numbers, so this shows how well the structure holds, not an independent validation.
+"""
+
+import sys
+from dataclasses import dataclass
+
+from rich.console import Console
+from rich.table import Table
+
+from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.cycles import load_cycle
+from qpmpc.simulate import simulate
+from qpmpc.vehicle import load_vehicle
+
+M_PER_MILE = 1609.344
+L_PER_GALLON = 3.785411784
+TOLERANCE = 0.03  # of the model's own reference figures
+
+_COLD_ROAD = {
+    # S EPA test-car list, 2016 Prius, cold-CO test
+    "chassis.road_load_a_n": 90.308,
+    "chassis.road_load_b_n_per_mps": 3.26639,
+    "chassis.road_load_c_n_per_mps2": 0.341127,
+}
+_HOT = {"thermal.t_amb_degc": 24.0, "thermal.cabin_heat_w": 0.0, "thermal.t_cl_min_degc": -30.0}
+_COLD = {
+    **_COLD_ROAD,
+    "thermal.t_amb_degc": -7.0,
+    "thermal.t_cl_min_degc": -30.0,
+    "battery.aux_power_w": 700.0,
+    "thermal.cabin_heat_w": 3300.0,  # F heater power
+    "thermal.cabin_heat_from_degc": 35.0,
+    "thermal.cabin_heat_full_degc": 55.0,
+}
+_HOT_RULES: dict[str, object] = {"rule_based.heat_on_degc": 40.0, "rule_based.heat_off_degc": 45.0}
+_COLD_RULES: dict[str, object] = {"rule_based.heat_on_degc": 60.0, "rule_based.heat_off_degc": 64.0}
+
+
+def _from(t_cl_degc: float) -> dict[str, object]:
+    return {"trip.t_cl_init_degc": t_cl_degc}
+
+
+@dataclass(frozen=True)
+class EpaCase:
+    """One dynamometer test.
+
+    Attributes
+    ----------
+    epa_mpg : measured by EPA
+    reference_mpg : what this plant's equations gave when its free numbers were fitted
+    vehicle, rules : overrides
+    """
+
+    name: str
+    cycle: str
+    epa_mpg: float
+    reference_mpg: float
+    vehicle: dict[str, object]
+    rules: dict[str, object]
+
+
+CASES = (
+    EpaCase("UDDS hot", "udds", 82.0, 79.4, {**_HOT, **_from(88.0)}, _HOT_RULES),
+    EpaCase("HWFET hot", "hwfet", 71.2, 72.7, {**_HOT, **_from(88.0)}, _HOT_RULES),
+    EpaCase("UDDS cold, 24 C", "udds", 73.7, 70.3, {**_HOT, **_from(24.0)}, _HOT_RULES),
+    EpaCase("UDDS cold, -7 C", "udds", 46.4, 45.5, {**_COLD, **_from(-7.0)}, _COLD_RULES),
+    EpaCase("UDDS warm, -7 C", "udds", 58.4, 58.3, {**_COLD, **_from(60.0)}, _COLD_RULES),
+)
+
+
+def model_mpg(case: EpaCase) -> float:
+    """Unadjusted, SOC-balanced miles per gallon of the default car in one case."""
+    vehicle = load_vehicle().with_settings(case.vehicle)
+    settings = ControllerSettings().with_settings(case.rules)
+    run = simulate(load_cycle(case.cycle), "rule-based", vehicle, settings=settings)
+    litres = run.fuel_soc_balanced_g / 1e3 / vehicle.engine.density_kg_per_l
+    return run.distance_km * 1e3 / M_PER_MILE / (litres / L_PER_GALLON)
+
+
+def main() -> int:
+    """Print the table; the exit code is 1 if a figure is off its reference by more than 3 %."""
+    table = Table(title="Rule-based, unadjusted mpg")
+    for column in ("case", "EPA", "this model", "reference", "off reference", "off EPA"):
+        table.add_column(column, justify="left" if column == "case" else "right")
+    worst = 0.0
+    for case in CASES:
+        mpg = model_mpg(case)
+        off = mpg / case.reference_mpg - 1.0
+        worst = max(worst, abs(off))
+        table.add_row(
+            case.name,
+            f"{case.epa_mpg:.1f}",
+            f"{mpg:.1f}",
+            f"{case.reference_mpg:.1f}",
+            f"{off:+.1%}",
+            f"{mpg / case.epa_mpg - 1.0:+.1%}",
+        )
+    Console().print(table)
+    return 0 if worst <= TOLERANCE else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

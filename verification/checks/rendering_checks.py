@@ -1,0 +1,86 @@
+"""The other renderings of QP and controller, fed with what the closed loops saw."""
+
+from collections.abc import Iterator
+from math import nan
+
+import numpy as np
+
+from qpmpc.codegen import generated_controller
+from qpmpc.codegen.host_library import compiler
+from qpmpc.controllers.base import Observation
+from qpmpc.cycles import load_cycle
+from qpmpc.preview import Trace
+from qpmpc.vehicle import Plant
+from qpmpc.verification.checks.check import Check
+from qpmpc.verification.checks.context import Context, Loop
+
+QUICK_EVERY, QUICK_RANDOM = 30, 16  # recorded steps from one case to the next; random cases
+FULL_EVERY, FULL_RANDOM = 8, 100
+SEED = 1
+ENTRIES = 1e-12  # of rows of unit norm, in solver units: some hundred roundings
+OPTIMUM = 1e-6
+NAMES = {
+    "cvxpy": "The QP compiled by cvxpy from its equations",
+    "casadi": "The QP that CasADi derives from the bilinear problem",
+    "c": "The QP that the generated C holds, asked of its own solver,",
+}
+F64_W = 1e-3  # after hundreds of steps of warm starts, each from the last
+NO_COMPILER = "no C compiler here"
+CLAIM = "Fed with the same measurements, generated C commands the same power as Python."
+
+
+def one_qp(context: Context) -> Iterator[Check]:
+    """The QP in all its renderings, on recorded and random states."""
+    from qpmpc.verification.renderings.equivalence import check_equivalence
+
+    every, random = (QUICK_EVERY, QUICK_RANDOM) if context.quick else (FULL_EVERY, FULL_RANDOM)
+    for name in context.cycles:
+        cycle = load_cycle(name)
+        found = check_equivalence(cycle, context.vehicle, every, random, SEED, context.settings)
+        worst = found.worst()
+        cases = f"{len(found.cases) - random} recorded and {random} random cases"
+        for key, what in NAMES.items():
+            titles = (f"Matrices, {key}, {name}", f"Optimum, {key}, {name}")
+            claims = (
+                f"{what} has the same rows, bounds and cost as numpy's, in any order.",
+                f"{what} has the same optimum as numpy's, and its solution keeps numpy's rows.",
+            )
+            if key not in worst:
+                for title, claim in zip(titles, claims, strict=True):
+                    yield Check(title, claim, 0.0, nan, "", NO_COMPILER, skipped=True)
+                continue
+            of = worst[key]
+            yield Check(titles[0], claims[0], ENTRIES, of.matrices, "", cases)
+            detail = f"{cases}; cost off by {of.optimum:.1e}, rows by {of.violation:.1e}"
+            worse = float(np.max([of.optimum, of.violation]))  # nan if one of them is
+            yield Check(titles[1], claims[1], OPTIMUM, worse, "", detail)
+
+
+def generated_c(context: Context) -> Iterator[Check]:
+    """The generated C of this machine, in double precision, along the closed loops."""
+    for loop in context.loops:
+        title = f"Generated C, {loop.cycle.name}"
+        if compiler() is None:
+            yield Check(title, CLAIM, F64_W, nan, "W", NO_COMPILER, skipped=True)
+            continue
+        worst, flips = _compare(loop, context)
+        yield Check(
+            title, CLAIM, F64_W, worst, "W", f"engine state differs in {flips} of "
+            f"{loop.cycle.steps} steps"
+        )  # fmt: skip
+
+
+def _compare(loop: Loop, context: Context) -> tuple[float, int]:
+    """Largest difference of the engine power applied, W, and steps with another engine state."""
+    tr, vehicle = loop.run.trajectory, loop.run.vehicle
+    plant, truth = Plant(vehicle), Trace.of(loop.cycle, vehicle)
+    controller = generated_controller(plant, truth, settings=context.settings, precision="f64")
+    worst, flips, was_on = 0.0, 0, False
+    for k in range(loop.cycle.steps):
+        soc, t_cl_degc = float(tr.soc[k]), float(tr.t_cl_degc[k])
+        demand, speed = float(tr.demand_w[k]), float(tr.speed_mps[k])
+        command = controller.decide(Observation(k, soc, t_cl_degc, was_on, demand, speed)).command
+        flips += command.engine_on != bool(tr.engine_on[k])
+        worst = max(worst, abs(command.p_eng_w - float(tr.p_eng_w[k])))
+        was_on = bool(tr.engine_on[k])
+    return worst, flips

@@ -1,0 +1,1 @@
+"""The nonlinear program that the QP approximates, as a controller (CasADi, IPOPT)."""

@@ -1,0 +1,225 @@
+"""`mh-qp` beside the nonlinear program it approximates: plan by plan, and run by run."""
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpmpc.controllers.base import Decision, Observation
+from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.controllers.mh_qp import MhQp
+from qpmpc.controllers.planner import Plan
+from qpmpc.cycles import Cycle
+from qpmpc.preview.forecast import Trace
+from qpmpc.qp.structure import Var
+from qpmpc.simulate import simulate
+from qpmpc.vehicle.engine import OptimalLine, alpha
+from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.vehicle.plant import Plant
+from qpmpc.verification.nonlinear.mh_nlp import MhNlp, make_mh_nlp
+from qpmpc.verification.nonlinear.problem import NlpVar
+from qpmpc.verification.nonlinear.solver import NlpPlan
+
+Floats = NDArray[np.float64]
+
+ON_LEAST = 0.01  # on-share from which a stage of the NLP counts as burning fuel
+
+
+@dataclass(frozen=True)
+class PlanPair:
+    """Both plans from the same state, at one step of the closed loop of `mh-qp`.
+
+    Attributes
+    ----------
+    step : of the trip
+    qp_on_share, nlp_on_share : sigma of the first second
+    qp_power_w, nlp_power_w : engine power of the first second, mean over it (E)
+    soc_difference : largest difference of the predicted SOC, over all stages
+    t_cl_difference_k : the same of the coolant, up to the last stage in which fuel is planned;
+        after it heat has no more use, and the QP leaves it undetermined
+    qp_fuel_g, nlp_fuel_g : planned fuel to arrival
+    """
+
+    step: int
+    qp_on_share: float
+    nlp_on_share: float
+    qp_power_w: float
+    nlp_power_w: float
+    soc_difference: float
+    t_cl_difference_k: float
+    qp_fuel_g: float
+    nlp_fuel_g: float
+
+
+@dataclass(frozen=True)
+class OpenLoopComparison:
+    """Plans of both programs along one cycle; unsolved NLPs are counted and left out."""
+
+    cycle: str
+    pairs: list[PlanPair]
+    nlp_unsolved: int
+
+    def summary(self) -> dict[str, Any]:
+        """Return the differences as plain data; fuel in percent of the fuel of the whole trip."""
+        pairs, trip_fuel_g = self.pairs, self.pairs[0].nlp_fuel_g
+        fuel = np.array([pair.qp_fuel_g - pair.nlp_fuel_g for pair in pairs])
+        return {
+            "cycle": self.cycle,
+            "states": len(pairs),
+            "nlp_unsolved": self.nlp_unsolved,
+            "same_on_off_share": float(
+                np.mean([(p.qp_on_share < 0.5) == (p.nlp_on_share < 0.5) for p in pairs])
+            ),
+            "first_power_w": _spread(np.array([p.qp_power_w - p.nlp_power_w for p in pairs])),
+            "soc": _spread(np.array([pair.soc_difference for pair in pairs])),
+            "t_cl_k": _spread(np.array([pair.t_cl_difference_k for pair in pairs])),
+            "planned_fuel_percent": _spread(100.0 * fuel / trip_fuel_g),
+        }
+
+
+@dataclass(frozen=True)
+class ClosedLoopComparison:
+    """Both controllers on one cycle, in one process; figures as in `Run.summary`.
+
+    Attributes
+    ----------
+    fuel_difference_percent : SOC-balanced fuel of `mh-qp` against that of `mh-nlp`
+    time_ratio : step time of `mh-qp` over that of `mh-nlp`, median, p99 and max
+    """
+
+    cycle: str
+    qp: dict[str, Any]
+    nlp: dict[str, Any]
+    fuel_difference_percent: float
+    time_ratio: dict[str, float]
+
+
+@dataclass(frozen=True)
+class NlpComparison:
+    """Open and closed loop, cycle by cycle."""
+
+    open_loop: list[OpenLoopComparison]
+    closed_loop: list[ClosedLoopComparison]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, ready for JSON."""
+        return {
+            "open_loop": [one.summary() for one in self.open_loop],
+            "closed_loop": [asdict(one) for one in self.closed_loop],
+        }
+
+
+class _Paired:
+    """Drives with `mh-qp` and, every few steps, plans with the nonlinear program as well."""
+
+    name, solver_name = "mh-qp", "osqp"
+
+    def __init__(self, qp: MhQp, nlp: MhNlp, plant: Plant, every: int) -> None:
+        self.pairs: list[PlanPair] = []
+        self.unsolved = 0
+        self._qp, self._nlp, self._every = qp, nlp, every
+        self._line, self._vehicle = OptimalLine(plant.vehicle.engine), plant.vehicle
+
+    def decide(self, seen: Observation) -> Decision:
+        decision = self._qp.decide(seen)
+        qp = self._qp.planner.plan
+        if seen.step % self._every == 0 and qp is not None and not decision.fallback:
+            nlp = self._nlp.plan(seen.step, seen.soc, seen.t_cl_degc)
+            if nlp.solved:
+                self.pairs.append(self._pair(seen, qp, nlp))
+            else:
+                self.unsolved += 1
+        return decision
+
+    def _pair(self, seen: Observation, qp: Plan, nlp: NlpPlan) -> PlanPair:
+        h = qp.stages.duration_s
+        soc = np.abs(qp.x[:, Var.SOC] - nlp.x[:, NlpVar.SOC])
+        t_cl = np.abs(qp.x[:, Var.T_CL] - nlp.x[:, NlpVar.T_CL])
+        sigma = nlp.x[:, NlpVar.ON]
+        power = np.array([nlp.power_on_w(stage) for stage in range(len(h))])
+        nlp_rate = sigma * self._line.fuel(power)
+        counts = h > 0.0
+        burning = np.flatnonzero(counts & (sigma > ON_LEAST))
+        warmed = slice(0, 1 + (int(burning[-1]) if burning.size else 0))
+        return PlanPair(
+            step=seen.step,
+            qp_on_share=float(qp.x[0, Var.ON]),
+            nlp_on_share=float(sigma[0]),
+            qp_power_w=float(qp.x[0, Var.P_ENG]),
+            nlp_power_w=float(sigma[0] * power[0]),
+            soc_difference=float(soc[counts].max()),
+            t_cl_difference_k=float(t_cl[warmed].max()),
+            qp_fuel_g=self._fuel_g(h, qp.x[:, Var.T_CL], qp.x[:, Var.FUEL], seen.t_cl_degc),
+            nlp_fuel_g=self._fuel_g(h, nlp.x[:, NlpVar.T_CL], nlp_rate, seen.t_cl_degc),
+        )
+
+    def _fuel_g(self, h: Floats, t_cl_degc: Floats, hot_g_per_s: Floats, now_degc: float) -> float:
+        """Planned fuel, sum h alpha(T) F with T the mean over the stage."""
+        mean = 0.5 * (t_cl_degc + np.concatenate([[now_degc], t_cl_degc[:-1]]))
+        return float(np.sum(h * alpha(self._vehicle.cold_engine, mean) * hot_g_per_s))
+
+
+def compare_open_loop(
+    cycle: Cycle, vehicle: Vehicle, every: int = 5, settings: ControllerSettings | None = None
+) -> OpenLoopComparison:
+    """Plan with both programs at every `every`-th state of the closed loop of `mh-qp`.
+
+    Raises
+    ------
+    QpmpcError
+        If CasADi is not installed.
+    """
+    chosen = settings or ControllerSettings()
+    plant, truth = Plant(vehicle), Trace.of(cycle, vehicle)
+    qp = MhQp("mh-qp", plant, truth, truth, chosen.mh_qp, chosen.rule_based)
+    paired = _Paired(qp, make_mh_nlp(plant, truth, truth, chosen), plant, every)
+    simulate(cycle, paired, vehicle)
+    return OpenLoopComparison(cycle.name, paired.pairs, paired.unsolved)
+
+
+def compare_closed_loop(
+    cycle: Cycle, vehicle: Vehicle, settings: ControllerSettings | None = None
+) -> ClosedLoopComparison:
+    """Drive a cycle with both controllers.
+
+    Raises
+    ------
+    QpmpcError
+        If CasADi is not installed.
+    """
+    chosen = settings or ControllerSettings()
+    nlp_controller = make_mh_nlp(Plant(vehicle), Trace.of(cycle, vehicle), None, chosen)
+    qp = simulate(cycle, "mh-qp", vehicle, settings=chosen).summary()
+    nlp = simulate(cycle, nlp_controller, vehicle).summary()
+    fuel = "fuel_soc_balanced_g"
+    return ClosedLoopComparison(
+        cycle=cycle.name,
+        qp=qp,
+        nlp=nlp,
+        fuel_difference_percent=100.0 * (qp[fuel] / nlp[fuel] - 1.0),
+        time_ratio={
+            key: qp["step_time_ms"][key] / nlp["step_time_ms"][key] for key in nlp["step_time_ms"]
+        },
+    )
+
+
+def compare(cycles: Iterable[Cycle], vehicle: Vehicle, every: int = 5) -> NlpComparison:
+    """Compare open and closed loop on several cycles; see `compare_open_loop`."""
+    listed = list(cycles)
+    return NlpComparison(
+        [compare_open_loop(cycle, vehicle, every) for cycle in listed],
+        [compare_closed_loop(cycle, vehicle) for cycle in listed],
+    )
+
+
+def _spread(differences: Floats) -> dict[str, float]:
+    """Mean, median, 95th percentile and largest of the absolute differences."""
+    size = np.abs(differences)
+    return {
+        "mean": float(size.mean()),
+        "median": float(np.median(size)),
+        "p95": float(np.percentile(size, 95)),
+        "max": float(size.max()),
+    }

@@ -1,0 +1,232 @@
+"""The multi-horizon problem as a nonlinear program: exact maps, no linearisation, no pieces."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpmpc.preview.stages import Stages
+from qpmpc.qp.stage_qp import ACCURATE_STAGE_S, SIGMA_FORCED, T_CL_MAX_MARGIN_K, QpSettings
+from qpmpc.vehicle.battery import BatteryMaps
+from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.verification.nonlinear.maps import SmoothMaps, casadi
+
+Floats = NDArray[np.float64]
+
+
+class NlpVar(IntEnum):
+    """Variables of a stage, in solver units (`UNIT` says how much SI one of them is)."""
+
+    SOC = 0  # at the end of the stage
+    T_CL = 1  # degC, at the end of the stage
+    ABOVE = 2  # D, mean engine power above the least it can run at, W
+    ON = 3  # sigma, share of the stage with the engine on
+    T_SLACK = 4  # K beyond the coolant limits
+
+
+NLP_VARS = len(NlpVar)
+UNIT = np.array([0.01, 1.0, 10e3, 1.0, 1.0])
+
+SOC_ROW = 2  # of the rows of a stage, the limit that may have to give way
+SIGMA_LEAST = 1e-4  # keeps the power of an engine that is off at its best value, ready to go on
+SOC_SHORTFALL_G = 5000.0  # price of a unit of SOC missed, over ten times its worth in fuel
+WASTE_G = 0.01  # price of 0.01 of SOC thrown away, far below its worth: keeps SOC determined
+# g per stage, on squared power, on-share and slack in solver units
+REGULARISATION, MASKED_REGULARISATION = 1e-6, 1e-3
+THERMOSTAT_STEPS = 8  # of a long stage; measured: 0.2 K in the mean at 200 s, 0.03 K at 90 s
+NO_DIVISION_BY_ZERO = 1e-9
+POWER_GAP_W = 10.0  # least distance of the limits of engine power
+
+
+@dataclass(frozen=True)
+class NlpData:
+    """Parameters and bounds of one step's problem; `power_least_w` is of a running engine."""
+
+    power_least_w: Floats
+    parameters: Floats
+    lower: Floats
+    upper: Floats
+    row_lower: Floats
+    row_upper: Floats
+
+
+class NlpProblem:
+    """The nonlinear program of one trip: built once, parameters and bounds updated each step.
+
+    min  sum_k h_k alpha(T_k) sigma_k f(P_k) + prices of limits exceeded, subject to
+
+    - SOC_k <= SOC_{k-1} - h_k/C_bat [sigma_k I(SOC, P0_k - P_k) + (1 - sigma_k) I_off,k(SOC)]
+      (paper eq. 1; smaller where the friction brakes take what a full battery cannot), with
+      U I_off = l_k + G(SOC, P0_k) - G(SOC_init, P0_k) and l_k the stage's mean off-power
+    - C dT/dt = (1 - x)(LHV alpha(T) F_k - E_k) - UA(v_k)(T - T_amb) - Q_heat(T) - Q_rad (eq. 3)
+      with F = sigma f(P), E = sigma P; Q_rad follows T within the stage
+    - the limits of eqs. (9)-(11), T and SOC without index being the mean over the stage
+
+    The variables are sigma and D with P = P_least + D / sigma: in this perspective form the program
+    is convex but for alpha(T) and the voltage, which a product sigma P is not.
+
+    sigma is the share of the stage with the engine on: exact for long stages, whose seconds may
+    differ, and a relaxation for those of one second. There, `on_off_g` prices sigma (1 - sigma).
+
+    Parameters
+    ----------
+    vehicle : parameters
+    stages : number of stages
+    short_stages : how many of them, at the front, are of one second
+    settings : terminal band and margins, the same as the QP's
+    """
+
+    def __init__(
+        self, vehicle: Vehicle, stages: int, short_stages: int, settings: QpSettings
+    ) -> None:
+        self.vehicle, self.stages, self.settings = vehicle, stages, settings
+        self._maps = SmoothMaps(vehicle)
+        self._build(short_stages)
+
+    def _build(self, short_stages: int) -> None:
+        ca, n, trip = casadi(), self.stages, self.vehicle.trip
+        z = ca.MX.sym("z", NLP_VARS, n)
+        missing = ca.MX.sym("missing")  # of SOC, in solver units
+        road = ca.MX.sym("road", 6, n)  # h, P0, v, l, least and most engine power
+        state = ca.MX.sym("state", 2)
+        on_off_g = ca.MX.sym("on_off_g")
+        x = z * ca.repmat(ca.DM(UNIT), 1, n)
+        before = ca.horzcat(state, x[: NlpVar.T_CL + 1, :-1])
+        parts = []
+        for inside, steps in ((slice(short_stages), 1), (slice(short_stages, n), THERMOSTAT_STEPS)):
+            if count := len(range(n)[inside]):
+                stage = self._stage(steps).map(count)
+                parts.append(stage(before[:, inside], x[:, inside], road[:, inside]))
+        fuel_g, soc_gain, t_cl_gap = (ca.horzcat(*part) for part in zip(*parts, strict=True))
+        sigma = x[NlpVar.ON, :]
+        short = sigma[:, :short_stages]
+        cost = ca.sum2(fuel_g) + self.settings.slack_g_per_k * ca.sum2(x[NlpVar.T_SLACK, :])
+        cost += SOC_SHORTFALL_G * UNIT[NlpVar.SOC] * missing
+        cost += WASTE_G * ca.sum2(soc_gain) / UNIT[NlpVar.SOC]
+        weight = ca.if_else(road[0, :] > 0.0, REGULARISATION, MASKED_REGULARISATION)
+        cost += ca.sum2(weight * ca.sum1(z[NlpVar.ABOVE :, :] ** 2))
+        cost += on_off_g * ca.sum2(short * (1.0 - short))
+        if self.settings.soc_penalty_g:
+            cost += self.settings.soc_penalty_g * (x[NlpVar.SOC, -1] - trip.soc_init) ** 2
+        rows = ca.vertcat(
+            soc_gain / UNIT[NlpVar.SOC],
+            t_cl_gap,
+            z[NlpVar.SOC, :] + missing,
+            x[NlpVar.T_CL, :] + x[NlpVar.T_SLACK, :],
+            x[NlpVar.T_CL, :] - x[NlpVar.T_SLACK, :],
+            ((road[5, :] - road[4, :]) * sigma - x[NlpVar.ABOVE, :]) / UNIT[NlpVar.ABOVE],
+        )
+        self.rows_per_stage = rows.shape[0]
+        self.program: dict[str, Any] = {
+            "x": ca.vertcat(ca.vec(z), missing),
+            "p": ca.vertcat(ca.vec(road), state, on_off_g),
+            "f": cost,
+            "g": ca.vec(rows),
+        }
+        self._row_lower, self._row_upper = self._row_bounds()
+
+    def _stage(self, thermostat_steps: int) -> Any:
+        """One stage: (SOC and T before, variables, road) -> fuel g, SOC surplus, coolant gap."""
+        ca, maps, vehicle = casadi(), self._maps, self.vehicle
+        th = vehicle.thermal
+        before, x, road = ca.SX.sym("before", 2), ca.SX.sym("x", NLP_VARS), ca.SX.sym("road", 6)
+        h, net_w, speed_mps = road[0], road[1], road[2]
+        sigma = x[NlpVar.ON]
+        power = road[4] + x[NlpVar.ABOVE] / sigma
+        soc = 0.5 * (before[0] + x[NlpVar.SOC])
+        t_cl = 0.5 * (before[1] + x[NlpVar.T_CL])
+        most_w = ca.fmin(net_w, vehicle.battery.power_discharge_max_w)
+        off_w = road[3] + maps.internal_w(soc, most_w)
+        off_w -= maps.internal_w(vehicle.trip.soc_init, most_w)
+        drawn_w = sigma * maps.internal_w(soc, net_w - power) + (1.0 - sigma) * off_w
+        current = drawn_w / maps.voltage_v(soc)
+        fuel = maps.alpha(t_cl) * sigma * maps.fuel_g_per_s(power)  # g/s, of the cold engine
+        lhv_j_per_g = vehicle.engine.lhv_j_per_g
+        heat = (1.0 - th.exhaust_share) * (lhv_j_per_g * fuel - sigma * power)
+        heat -= (th.ua0_w_per_k + th.ua1_w_per_k_per_mps * speed_mps) * (t_cl - th.t_amb_degc)
+        heat -= maps.cabin_w(t_cl)
+        soc_gain = before[0] - h * current / (3600.0 * vehicle.battery.capacity_ah) - x[NlpVar.SOC]
+        t_cl_gap = self._coolant_after(before[1], h, heat, thermostat_steps) - x[NlpVar.T_CL]
+        return ca.Function("stage", [before, x, road], [h * fuel, soc_gain, t_cl_gap])
+
+    def _coolant_after(self, t_cl_degc: Any, h: Any, heat_w: Any, steps: int) -> Any:
+        """T after a stage of constant heat, the thermostat opening or closing on the way.
+
+        C dT/dt = q - Q_rad(T), each of the steps exact for Q_rad linear about its start: stable
+        however long it is.
+        """
+        ca, capacity = casadi(), self.vehicle.thermal.heat_capacity_j_per_k
+        at = ca.SX.sym("at")
+        radiator = self._maps.radiator_w(at)
+        radiator_and_slope = ca.Function("radiator", [at], [radiator, ca.gradient(radiator, at)])
+        step = h / steps
+        for _ in range(steps):
+            taken_w, slope = radiator_and_slope(t_cl_degc)
+            share = step * slope / capacity + NO_DIVISION_BY_ZERO
+            t_cl_degc += -ca.expm1(-share) / share * step * (heat_w - taken_w) / capacity
+        return t_cl_degc
+
+    def _row_bounds(self) -> tuple[Floats, Floats]:
+        """Bounds of the rows, but for the lower limits of SOC, which change."""
+        thermal, settings = self.vehicle.thermal, self.settings
+        lower, upper = np.full((self.stages, 6), -np.inf), np.full((self.stages, 6), np.inf)
+        lower[:, [0, 1, 5]], upper[:, 1] = 0.0, 0.0
+        lower[:, 3] = thermal.t_cl_min_degc + settings.t_cl_margin_k
+        upper[:, 4] = thermal.t_cl_max_degc - T_CL_MAX_MARGIN_K
+        return lower, upper
+
+    def data(self, stages: Stages, soc: float, t_cl_degc: float, on_off_g: float = 0.0) -> NlpData:
+        """Parameters and bounds for a horizon and a state.
+
+        Parameters
+        ----------
+        stages : the road ahead
+        soc, t_cl_degc : state at its start
+        on_off_g : price of sigma (1 - sigma) in the short stages, g
+        """
+        battery, engine = self.vehicle.battery, self.vehicle.engine
+        net = stages.net_w
+        lower, upper = np.zeros((self.stages, NLP_VARS)), np.zeros((self.stages, NLP_VARS))
+        most = np.minimum(engine.power_max_w, net + battery.power_charge_max_w)
+        least = np.maximum(engine.power_min_w, net - battery.power_discharge_max_w)
+        must, can = net > battery.power_discharge_max_w, most > engine.power_min_w
+        least = np.minimum(least, engine.power_max_w - POWER_GAP_W)
+        most = np.maximum(most, least + POWER_GAP_W)
+        lower[:, NlpVar.SOC], upper[:, NlpVar.SOC] = 0.0, battery.soc_max / UNIT[NlpVar.SOC]
+        if not self.settings.soc_penalty_g:
+            high = self.settings.terminal_high * self.vehicle.trip.soc_init
+            upper[-1, NlpVar.SOC] = min(high, battery.soc_max) / UNIT[NlpVar.SOC]
+        lower[:, NlpVar.T_CL], upper[:, NlpVar.T_CL] = self.vehicle.thermal.t_amb_degc, 120.0
+        upper[:, NlpVar.ABOVE] = np.inf
+        lower[:, NlpVar.ON] = np.where(must, SIGMA_FORCED, SIGMA_LEAST)
+        upper[:, NlpVar.ON] = np.where(can, 1.0, 2.0 * SIGMA_LEAST)
+        upper[:, NlpVar.T_SLACK] = np.inf
+        road = np.stack(
+            [stages.duration_s, net, stages.speed_mps, stages.internal_off_w, least, most]
+        )
+        row_lower = self._row_lower.copy()
+        row_lower[:, SOC_ROW] = self._soc_low(stages, soc) / UNIT[NlpVar.SOC]
+        return NlpData(
+            power_least_w=least,
+            parameters=np.concatenate([road.ravel(order="F"), [soc, t_cl_degc, on_off_g]]),
+            lower=np.append(lower.ravel(), 0.0),
+            upper=np.append(upper.ravel(), np.inf),
+            row_lower=row_lower.ravel(),
+            row_upper=self._row_upper.ravel(),
+        )
+
+    def _soc_low(self, stages: Stages, soc: float) -> Floats:
+        """Lower limits of SOC, with the QP's reserve, as far as charging all the way reaches."""
+        battery, trip, settings = self.vehicle.battery, self.vehicle.trip, self.settings
+        reserve = settings.soc_reserve * max(trip.soc_init - battery.soc_min, 0.0)
+        low = battery.soc_min + np.where(stages.duration_s > ACCURATE_STAGE_S, reserve, 0.0)
+        if not settings.soc_penalty_g:
+            low[-1] = max(settings.terminal_low * trip.soc_init, battery.soc_min)
+        most_w = self.vehicle.engine.power_max_w
+        strongest = np.maximum(stages.net_w - most_w, -battery.power_charge_max_w)
+        maps = BatteryMaps(battery)
+        gain = stages.duration_s * maps.internal_power_w(trip.soc_init, strongest)
+        reach = soc - np.cumsum(gain) / maps.energy_j(trip.soc_init)
+        return np.asarray(np.minimum(low, reach))

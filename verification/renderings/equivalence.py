@@ -1,0 +1,234 @@
+"""One QP in four renderings, shown equal: numpy, cvxpy, CasADi by differentiation, generated C."""
+
+import warnings
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from qpmpc.codegen.controller import InputBuilder
+from qpmpc.codegen.host_library import compiler
+from qpmpc.codegen.values import values_of
+from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.cycles import Cycle
+from qpmpc.errors import QpmpcError
+from qpmpc.preview.forecast import Trace
+from qpmpc.preview.stages import StageBuilder, Stages
+from qpmpc.pwa.model import PwaModel
+from qpmpc.qp.cvxpy_twin import CvxpyTwin
+from qpmpc.qp.linearisation import Linearisation
+from qpmpc.qp.stage_qp import QpData, StageQp
+from qpmpc.qp.structure import VARS, Var
+from qpmpc.solvers.base import Status
+from qpmpc.solvers.piqp import Piqp
+from qpmpc.solvers.timed import require
+from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.verification.renderings.casadi_qp import CasadiQp
+from qpmpc.verification.renderings.cvxpy_matrices import cvxpy_matrices
+from qpmpc.verification.renderings.generated_qp import GeneratedQp
+from qpmpc.verification.renderings.matrices import Matrices, difference, matrices_of
+from qpmpc.verification.renderings.qp_cases import QpCase, random_cases, recorded_cases
+
+Floats = NDArray[np.float64]
+
+EXACT = 1e-10  # tolerance of the product's QP, solved by PIQP, and of CasADi's, by QOCO
+CLARABEL_OPTIONS = {  # cvxpy's, in its units: grams. Its default regularisation costs digits
+    "tol_gap_abs": 1e-9,
+    "tol_gap_rel": 1e-9,
+    "tol_feas": 1e-9,
+    "static_regularization_constant": 1e-10,
+    "iterative_refinement_max_iter": 50,
+    "iterative_refinement_abstol": 1e-14,
+    "iterative_refinement_reltol": 1e-14,
+}
+C_TOLERANCE = 3e-8  # operator splitting: the last digits take as long as all before
+C_RHO = 0.02  # to the last digit; measured: less takes longer in the worst case, more in the mean
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Difference of one rendering from the product's own QP.
+
+    Attributes
+    ----------
+    matrices : largest difference of an entry, see `matrices.difference`
+    optimum : |J - J*| / (1 + |J*|) of its optimum, J* by PIQP on the product's matrices
+    violation : of the product's rows by that optimum, in solver units
+    """
+
+    matrices: float
+    optimum: float
+    violation: float
+
+
+@dataclass(frozen=True)
+class Equivalence:
+    """Differences over many cases, a dictionary a case: by rendering."""
+
+    cases: list[dict[str, Difference]]
+
+    def worst(self) -> dict[str, Difference]:
+        """Return the largest of each difference; nan where any is nan."""
+        return {
+            name: Difference(
+                *np.max([list(asdict(case[name]).values()) for case in self.cases], axis=0).tolist()
+            )
+            for name in self.cases[0]
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, ready for JSON."""
+        worst = {name: asdict(found) for name, found in self.worst().items()}
+        return {"cases": len(self.cases), "worst": worst}
+
+
+class Renderings:
+    """The QP of one trip in its renderings: `cvxpy`, `casadi` and, with a C compiler, `c`.
+
+    Each has a solver of its own: cvxpy calls Clarabel on what it compiles, CasADi's matrices go to
+    QOCO, the generated C iterates to the end, and the product's matrices go to PIQP.
+
+    Parameters
+    ----------
+    vehicle : plant parameters
+    truth : the trip
+    settings : of all controllers; those of `mh_qp` count
+
+    Raises
+    ------
+    QpmpcError
+        If CasADi, Clarabel, PIQP or QOCO is not installed.
+    """
+
+    def __init__(self, vehicle: Vehicle, truth: Trace, settings: ControllerSettings) -> None:
+        chosen = settings.mh_qp
+        model = PwaModel.of(vehicle, chosen.pwa)
+        self.preview = StageBuilder(vehicle, truth, truth, chosen.horizon)
+        stages = self.preview.count
+        self.qp = StageQp(vehicle, model, stages, chosen.qp, chosen.scaling)
+        self.twin = CvxpyTwin(vehicle, model, stages, chosen.qp)
+        self.casadi = CasadiQp(vehicle, model, stages, chosen.qp)
+        self.generated: GeneratedQp | None = None
+        if compiler() is not None:
+            blocks = chosen.horizon.block_count(truth.steps)
+            to_the_end = settings.with_settings({"mh_qp.osqp.rho": C_RHO})
+            values = values_of(vehicle, to_the_end.mh_qp, settings.rule_based, blocks)
+            self.generated = GeneratedQp(values, InputBuilder(self.preview, truth))
+        self._solver = Piqp(EXACT)
+        self._is_set_up = False
+
+    def inputs(self, case: QpCase) -> tuple[Stages, float, float, Linearisation]:
+        """Return what the renderings in Python are updated with."""
+        seen = case.seen
+        about = Linearisation.about(case.x, seen.t_cl_degc, self.preview.settings)
+        return self.preview.at(seen.step), seen.soc, seen.t_cl_degc, about
+
+    def compare(self, case: QpCase) -> dict[str, Difference]:
+        """Build and solve one case in all renderings."""
+        data = self.qp.update(*self.inputs(case))
+        column = data.scaling.column
+        ours = matrices_of(self.qp.structure, data)
+        best = ours.value(data.scaling.primal(self._solve(data)))
+        made: dict[str, Callable[[QpCase, QpData], tuple[Matrices, Floats]]] = {
+            "cvxpy": self._by_cvxpy,
+            "casadi": self._by_casadi,
+        }
+        if self.generated is not None:
+            made["c"] = self._by_c
+        found = {}
+        for name, make in made.items():
+            theirs, x = make(case, data)
+            found[name] = Difference(
+                matrices=difference(ours, theirs, column),
+                optimum=abs(ours.value(x) - best) / (1.0 + abs(best)),
+                violation=ours.violation(x, column),
+            )
+        return found
+
+    def _solve(self, data: QpData) -> Floats:
+        if not self._is_set_up:
+            self._solver.setup(self.qp.structure, data)
+            self._is_set_up = True
+        solution = self._solver.solve(data, None, None)
+        return solution.z if solution.status is Status.SOLVED else np.full_like(data.q, np.nan)
+
+    def _by_cvxpy(self, case: QpCase, data: QpData) -> tuple[Matrices, Floats]:
+        self.twin.update(*self.inputs(case), data.scaling)
+        matrices = cvxpy_matrices(self.twin)
+        with warnings.catch_warnings(action="ignore"):  # how accurate it is, is measured
+            try:
+                return matrices, self.twin.solve("CLARABEL", **CLARABEL_OPTIONS).ravel()
+            except QpmpcError:
+                return matrices, np.full_like(data.q, np.nan)
+
+    def _by_casadi(self, case: QpCase, data: QpData) -> tuple[Matrices, Floats]:
+        column, cost = data.scaling.column, data.scaling.cost
+        weight = np.sqrt(self.qp.settings.regularisation / cost)
+        smoothing = (weight / column).reshape(-1, VARS)
+        smoothing[:, [Var.SOC, Var.T_CL]] = 0.0
+        matrices = self.casadi.matrices(*self.inputs(case), smoothing)
+        return matrices, _by_qoco(matrices, column, cost)
+
+    def _by_c(self, case: QpCase, _: QpData) -> tuple[Matrices, Floats]:
+        assert self.generated is not None
+        matrices = self.generated.update(case.seen, case.x)
+        return matrices, self.generated.solve(C_TOLERANCE)
+
+
+def _by_qoco(m: Matrices, column: Floats, cost: float) -> Floats:
+    """Optimum by QOCO, in units that make its tolerances mean the same as the product's."""
+    equal, upper = m.equal * column, m.upper * column
+    equal_norm, upper_norm = np.linalg.norm(equal, axis=1), np.linalg.norm(upper, axis=1)
+    solver = require("qoco", "qoco").QOCO()
+    solver.setup(
+        n=len(column),
+        m=len(upper),
+        p=len(equal),
+        P=sp.csc_matrix(np.triu(cost * m.hessian * np.multiply.outer(column, column))),
+        c=cost * m.gradient * column,
+        A=sp.csc_matrix(equal / equal_norm[:, None]),
+        b=m.equal_to / equal_norm,
+        G=sp.csc_matrix(upper / upper_norm[:, None]),
+        h=m.upper_to / upper_norm,
+        l=len(upper),
+        nsoc=0,
+        q=None,
+        abstol=EXACT,
+        reltol=EXACT,
+    )
+    return np.array(solver.solve().x) * column
+
+
+def check_equivalence(
+    cycle: Cycle,
+    vehicle: Vehicle,
+    every: int = 5,
+    random: int = 100,
+    seed: int = 1,
+    settings: ControllerSettings | None = None,
+) -> Equivalence:
+    """Compare the renderings on recorded and random cases of one trip.
+
+    Parameters
+    ----------
+    cycle, vehicle : the trip
+    every : one recorded case each so many steps
+    random, seed : how many random cases, and their seed
+    settings : of all controllers
+
+    Raises
+    ------
+    QpmpcError
+        If CasADi or a solver is not installed.
+    """
+    chosen = settings or ControllerSettings()
+    truth = Trace.of(cycle, vehicle)
+    renderings = Renderings(vehicle, truth, chosen)
+    cases = [
+        *recorded_cases(cycle, vehicle, chosen, every),
+        *random_cases(truth, vehicle, renderings.preview.count, random, seed),
+    ]
+    return Equivalence([renderings.compare(case) for case in cases])

@@ -1,6 +1,0 @@
-"""The paper's figures and tables, regenerated beside its own numbers."""
-
-from qpmpc.verification.reproduce.study import Study, job_count, run_study
-from qpmpc.verification.reproduce.variants import Extent
-
-__all__ = ["Extent", "Study", "job_count", "run_study"]

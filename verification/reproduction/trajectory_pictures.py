@@ -1,0 +1,183 @@
+"""Pictures over time: baseline, horizons, all controllers, costates."""
+
+import numpy as np
+
+from qpmpc.report.style import BLACK, BLUE, ORANGE, PURPLE
+from qpmpc.verification.reproduction.drawing import (
+    engine_panel,
+    finish,
+    panels,
+    series,
+    speed_panel,
+    state_panels,
+    style,
+)
+from qpmpc.verification.reproduction.exhibits import Picture
+from qpmpc.verification.reproduction.study import Study
+from qpmpc.verification.reproduction.variants import OPTIMUM, OURS, PAPER_GRID, RULES, baseline
+
+
+def baseline_picture(study: Study, cycle: str) -> Picture:
+    """Trajectories of the baseline MPC."""
+    labels = [baseline(20), baseline(100)]
+    figure, axes = panels(5)
+    speed, short, long, soc, coolant = axes
+    run = study.runs[cycle, labels[0]]
+    speed_panel(speed, run)
+    for panel, label in zip((short, long), labels, strict=True):
+        engine_panel(panel, study.runs[cycle, label], label)
+    long.sharey(short)
+    state_panels(soc, coolant, study, cycle, labels)
+    return Picture(
+        f"baseline_{cycle}",
+        f"Baseline MPC on {cycle}",
+        "The baseline's SOC hardly moves: its penalty pulls it back at the end of every horizon.",
+        finish(figure, axes, f"{cycle}: baseline MPC", soc),
+        series(study, cycle, labels),
+    )
+
+
+def horizon_picture(study: Study) -> Picture:
+    """SOC for short and long horizons against DP, all of the paper's cycles."""
+    labels = [baseline(20), baseline(100), OPTIMUM]
+    cycles = [cycle.name for cycle in study.extent.cycles]
+    figure, axes = panels(len(cycles), 2.3)
+    data: dict[str, object] = {}
+    for panel, cycle in zip(axes, cycles, strict=True):
+        for label in labels:
+            soc = study.runs[cycle, label].trajectory.soc
+            panel.plot(soc, label=label, **style(label))
+            data[f"{cycle} {label} soc"] = soc.tolist()
+        panel.set_ylabel("SOC")
+        panel.set_title(cycle, loc="left", fontsize=9.5, fontweight="bold")
+    longest = max(len(study.runs[cycle, OPTIMUM].trajectory.soc) for cycle in cycles)
+    return Picture(
+        "soc_horizon",
+        "SOC: how far the horizon sees",
+        "A longer horizon moves the SOC more like dynamic programming does.",
+        finish(figure, axes, "SOC of the baseline for H = 20 and 100 s, and of DP", axes[0]),
+        {"time_s": range(longest), **data},  # type: ignore[dict-item]
+    )
+
+
+def all_picture(study: Study, cycle: str) -> Picture:
+    """SOC and coolant of rules, baseline, MH-MPC and DP."""
+    labels = [RULES, baseline(100), PAPER_GRID, OURS, OPTIMUM]
+    figure, axes = panels(4, 1.9)
+    speed, soc, coolant, fuel = axes
+    speed_panel(speed, study.runs[cycle, OURS])
+    state_panels(soc, coolant, study, cycle, labels)
+    for label in labels:
+        burnt = np.concatenate([[0.0], np.cumsum(study.runs[cycle, label].trajectory.fuel_g)])
+        fuel.plot(burnt, **style(label))
+    fuel.set_ylabel("fuel burnt\ng")
+    fuel.set_ylim(bottom=0)
+    return Picture(
+        f"trajectories_{cycle}",
+        f"All controllers on {cycle}",
+        "SOC, coolant and fuel of the rules, the baseline, both multi-horizon grids and DP.",
+        finish(figure, axes, f"{cycle}: SOC, coolant, fuel", soc),
+        series(study, cycle, labels),
+    )
+
+
+def thermal_picture(study: Study, cycle: str) -> Picture:
+    """What charge and heat are worth to the optimum, and what it does with them."""
+    best, run = study.optima[cycle], study.runs[cycle, OPTIMUM]
+    figure, axes = panels(5)
+    speed, engine, soc, coolant, worth = axes
+    speed_panel(speed, run)
+    engine_panel(engine, run, OPTIMUM)
+    soc.plot(best.soc, color=BLUE, linewidth=1.2)
+    soc.set_ylabel("SOC")
+    coolant.plot(study.runs[cycle, OURS].trajectory.t_cl_degc, label=OURS, **style(OURS))
+    coolant.plot(best.t_cl_degc, label=OPTIMUM, **style(OPTIMUM))
+    coolant.set_ylabel("coolant\n°C")
+    worth.plot(1e3 * best.t_cl_costate_g_per_k, color=PURPLE, linewidth=1.2)
+    worth.set_ylabel("a kelvin's\nworth, mg")
+    worth.set_ylim(bottom=min(0.0, float(1.1e3 * best.t_cl_costate_g_per_k.min())))
+    twin = worth.twinx()
+    twin.plot(best.soc_costate_g / 100.0, color=BLUE, linewidth=1.0)
+    twin.set_ylabel("SOC: worth of\n0.01, g", fontsize=8.5, color=BLUE)
+    twin.tick_params(labelsize=8, colors=BLUE)
+    worth.yaxis.label.set_color(PURPLE)
+    worth.tick_params(axis="y", colors=PURPLE)
+    twin.spines[["top", "left"]].set_color("none")
+    soc.axhline(study.vehicle.trip.soc_init, color=BLACK, linewidth=0.5)
+    return Picture(
+        f"thermal_{cycle}",
+        f"The coolant as a store: dynamic programming on {cycle}",
+        "The costates say what fuel a kelvin of coolant and a hundredth of SOC save later. Heat is "
+        "worth least where the trip no longer needs it: a warm engine at arrival is waste.",
+        finish(figure, axes, f"{cycle}: what heat and charge are worth", coolant),
+        {
+            "time_s": range(len(best.soc)),
+            "soc": best.soc.tolist(),
+            "t_cl_degc": best.t_cl_degc.tolist(),
+            "engine_on": best.engine_on.astype(int).tolist(),
+            "p_eng_w": best.p_eng_w.tolist(),
+            "soc_costate_g": best.soc_costate_g.tolist(),
+            "soc_efficiency": best.soc_efficiency.tolist(),
+            "t_cl_costate_g_per_k": best.t_cl_costate_g_per_k.tolist(),
+            "heat_costate_g_per_mj": best.heat_costate_g_per_mj.tolist(),
+        },
+    )
+
+
+def concept_picture(study: Study) -> Picture:
+    """Short and long horizon of one step, from real data: the paper's grid and ours."""
+    count = len(study.snapshots)
+    figure, axes = panels(2 * count, 1.6)
+    data: dict[str, object] = {}
+    for i, shot in enumerate(study.snapshots):
+        demand, plan_panel = axes[2 * i], axes[2 * i + 1]
+        stages, x = shot.plan.stages, shot.plan.x
+        used = stages.duration_s > 0.0
+        edges = shot.step + np.concatenate([[0.0], np.cumsum(stages.duration_s[used])])
+        truth = shot.truth.battery_side_w(study.vehicle) / 1e3
+        demand.stairs(
+            truth,
+            np.arange(len(truth) + 1),
+            baseline=None,
+            color="#bbbbbb",
+            linewidth=0.7,
+            label="the road",
+        )
+        demand.stairs(
+            stages.net_w[used] / 1e3,
+            edges,
+            baseline=None,
+            linewidth=1.4,
+            color=style(shot.label)["color"],
+            label="stages of the horizon",
+        )
+        demand.axvline(shot.step, color=BLACK, linewidth=0.8)
+        demand.set_ylabel("net power\nkW")
+        demand.legend(fontsize=8, frameon=False, ncols=2, loc="upper right")
+        demand.set_title(
+            f"{shot.label}: {int(used.sum())} stages at {shot.step} s",
+            loc="left",
+            fontsize=9.5,
+            fontweight="bold",
+        )
+        plan_panel.plot(edges[1:], x[used, 0], ".-", color=BLUE, markersize=3, linewidth=0.9)
+        plan_panel.set_ylabel("planned\nSOC", color=BLUE)
+        twin = plan_panel.twinx()
+        twin.plot(edges[1:], x[used, 1], ".-", color=ORANGE, markersize=3, linewidth=0.9)
+        twin.set_ylabel("planned\ncoolant, °C", fontsize=8.5, color=ORANGE)
+        twin.tick_params(labelsize=8)
+        data[f"{shot.label} stage_end_s"] = edges[1:].tolist()
+        data[f"{shot.label} duration_s"] = stages.duration_s[used].tolist()
+        data[f"{shot.label} net_w"] = stages.net_w[used].tolist()
+        data[f"{shot.label} soc"] = x[used, 0].tolist()
+        data[f"{shot.label} t_cl_degc"] = x[used, 1].tolist()
+    name = study.extent.cycles[0].name
+    return Picture(
+        "multi_horizon",
+        "Two horizons in one problem",
+        "Seconds first, then blocks to the trip's end. The paper's grid has a mean a block; ours "
+        "has up to three stages a block, hard driving, easy driving and braking, each with its own "
+        "duration: where in the block they happen is not known and does not matter.",
+        finish(figure, axes, f"{name}: what the QP sees at one step"),
+        data,  # type: ignore[arg-type]
+    )
