@@ -1,19 +1,20 @@
 """The generated C controller behind the Python API of any controller."""
 
 import ctypes
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.codegen.generate import Precision
-from qpmpc.codegen.host_library import VARS, HostLibrary, build_host_library
+from qpmpc.codegen.host_library import VARS, build_host_library
 from qpmpc.codegen.values import values_of
-from qpmpc.controllers.base import Decision, Observation
-from qpmpc.controllers.factory import ControllerSettings
-from qpmpc.preview.forecast import Trace
+from qpmpc.controllers.base import Controller, Decision, Progress
+from qpmpc.controllers.settings import ControllerSettings, MhQpSettings
 from qpmpc.preview.stages import StageBuilder
-from qpmpc.vehicle.plant import Command, Plant
+from qpmpc.trip import Observation, Trip
+from qpmpc.vehicle.plant import Command
 
 Floats = NDArray[np.float64]
 RUNGS = ("", "shifted plan", "rule-based")
@@ -25,14 +26,15 @@ class InputBuilder:
 
     Parameters
     ----------
-    preview : cuts the trip into stages
-    truth : what the short horizon sees
+    trip : whose truth the short horizon sees, and whose forecast the long one
+    of_qp : layout of the horizon
     """
 
-    def __init__(self, preview: StageBuilder, truth: Trace) -> None:
-        self._preview = preview
+    def __init__(self, trip: Trip, of_qp: MhQpSettings) -> None:
+        truth = trip.truth
+        self._preview = StageBuilder(trip.vehicle, truth, trip.forecast, of_qp.horizon)
         self._steps = truth.steps
-        self._short = preview.settings.short_stages
+        self._short = of_qp.horizon.short_stages
         padding = np.zeros(self._short)
         self._demand_w = np.concatenate([truth.demand_w, padding])
         self._speed_mps = np.concatenate([truth.speed_mps, padding])
@@ -52,56 +54,69 @@ class InputBuilder:
         into.long_internal_off_w[:long] = stages.internal_off_w[n:].tolist()
 
 
-class GeneratedController:
-    """One controller of a loaded library; several may run side by side.
+class GeneratedController(Controller):
+    """The whole controller in C on this machine, for one trip; several may run side by side.
 
     Parameters
     ----------
-    library : loaded
-    inputs : fills the input of each step
-    start : of the trip, to prepare the first plan; None: the rules drive while it warms up
+    trip, settings : as of `Controller`
+    of_qp : settings of the QP; those of `mh_qp` if None
+    precision : of all arithmetic
+    name : under which results are reported
+
+    Attributes
+    ----------
+    fill_s, call_s : wall time of the last step, s: of filling in its input, and of the C call
+
+    Raises
+    ------
+    InputError
+        If the settings do not fit generated code, see `values_of`.
+    CodegenError
+        If it cannot be built.
     """
 
-    name = "mh-qp"
+    implementation = "c"
+    has_safety_layer = True  # in C
 
     def __init__(
-        self, library: HostLibrary, inputs: InputBuilder, start: Observation | None
+        self,
+        trip: Trip,
+        settings: ControllerSettings | None = None,
+        of_qp: MhQpSettings | None = None,
+        precision: Precision = "f64",
+        name: str = "mh-qp",
     ) -> None:
-        self.solver_name = f"generated {library.precision}"
-        self.library = library
-        self._inputs = inputs
-        self._state = ctypes.create_string_buffer(library.state_bytes)
-        self._in, self._out = library.input_type(), library.output_type()
+        super().__init__(trip, settings)
+        self.of_qp = of_qp or self.settings.mh_qp
+        self.name, self.solver_name = name, f"admm {precision}"
+        blocks = self.of_qp.horizon.block_count(trip.forecast.steps)
+        values = values_of(trip.vehicle, self.of_qp, self.settings.rule_based, blocks)
+        self.library = build_host_library(values, precision)
+        self.fill_s = self.call_s = 0.0
+        self._inputs = InputBuilder(trip, self.of_qp)
+        self._state = ctypes.create_string_buffer(self.library.state_bytes)
+        self._in, self._out = self.library.input_type(), self.library.output_type()
         self._arguments = (self._state, ctypes.byref(self._in), ctypes.byref(self._out))
-        library.init(self._state)
-        if start is not None:
-            inputs.fill(start, self._in)
-            while library.depart(self._state, ctypes.byref(self._in)) > 0:
+
+    def depart(self, progress: Progress | None = None) -> None:
+        """Set a defined state; prepare the first plan, unless the settings leave that out."""
+        self.forget()
+        if self.of_qp.prepared:
+            self._inputs.fill(self.trip.start, self._in)
+            while self.library.depart(self._state, ctypes.byref(self._in)) > 0:
                 pass
 
-    def decide(self, seen: Observation) -> Decision:
+    def step(self, seen: Observation) -> Decision:
         """Run one step in C."""
-        self.fill(seen)
-        return self.step()
-
-    def fill(self, seen: Observation) -> None:
-        """Write the input of the next step."""
+        start = perf_counter()
         self._inputs.fill(seen, self._in)
-
-    def step(self) -> Decision:
-        """Run one step in C on the input as it stands."""
+        filled = perf_counter()
         self.library.step(*self._arguments)
-        out = self._out
-        planned = out.rung == 0
-        return Decision(
-            Command(bool(out.engine_on), out.p_eng_w),
-            RUNGS[out.rung],
-            out.iterations,
-            out.relaxation_gap if planned else float("nan"),
-            out.sigma if planned else float("nan"),
-        )
+        self.fill_s, self.call_s = filled - start, perf_counter() - filled
+        return decision_of(self._out)
 
-    def reset(self) -> None:
+    def forget(self) -> None:
         """Forget plan, warm start and the rules' memory, as after a restart of the ECU."""
         self.library.init(self._state)
 
@@ -117,38 +132,13 @@ class GeneratedController:
         )
 
 
-def generated_controller(
-    plant: Plant,
-    truth: Trace,
-    forecast: Trace | None = None,
-    settings: ControllerSettings | None = None,
-    precision: Precision = "f64",
-) -> GeneratedController:
-    """Make the `mh-qp` controller for one trip, in C on this machine.
-
-    Parameters
-    ----------
-    plant : vehicle and its maps
-    truth, forecast : what the short and the long horizon see; the truth if None
-    settings : of the controllers
-    precision : of all arithmetic
-
-    Raises
-    ------
-    InputError
-        If the settings do not fit generated code, see `values_of`.
-    CodegenError
-        If it cannot be built.
-    """
-    settings = settings or ControllerSettings()
-    forecast = forecast or truth
-    of_mpc, vehicle = settings.mh_qp, plant.vehicle
-    preview = StageBuilder(vehicle, truth, forecast, of_mpc.horizon)
-    blocks = of_mpc.horizon.block_count(forecast.steps)
-    library = build_host_library(values_of(vehicle, of_mpc, settings.rule_based, blocks), precision)
-    start = None
-    if of_mpc.prepared:
-        trip = vehicle.trip
-        demand_w, speed_mps = float(truth.demand_w[0]), float(truth.speed_mps[0])
-        start = Observation(0, trip.soc_init, trip.t_cl_init_degc, False, demand_w, speed_mps)
-    return GeneratedController(library, InputBuilder(preview, truth), start)
+def decision_of(out: Any) -> Decision:
+    """Return what an `mpc_out` says."""
+    planned = out.rung == 0
+    return Decision(
+        Command(bool(out.engine_on), float(out.p_eng_w)),
+        RUNGS[out.rung],
+        out.iterations,
+        float(out.relaxation_gap) if planned else float("nan"),
+        float(out.sigma) if planned else float("nan"),
+    )

@@ -10,7 +10,7 @@ import numpy as np
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from numpy.typing import NDArray
 
-from qpmpc import __version__
+from qpmpc._version import __version__
 from qpmpc.codegen.osqp_source import CONSTANT_ARRAYS, PREFIX, osqp_files, osqp_version
 from qpmpc.codegen.values import CONSTANTS, Values
 from qpmpc.errors import InputError

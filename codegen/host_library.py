@@ -207,6 +207,6 @@ def _build(files: Mapping[str, str], command: str, kept: Path) -> None:
         if result.returncode or not _loads(made):
             first = next(iter(result.stderr.strip().splitlines()), "no library came of it")
             raise CodegenError(
-                f"C compiler {command} failed: {first}; mh_qp.solver=osqp does without"
+                f"C compiler {command} failed: {first}; mh_qp.implementation=python does without"
             )
         made.replace(kept)

@@ -37,6 +37,7 @@ CONSTANT_ARRAYS = (
 # a certificate of infeasibility is begun: the same work every step. What is usable is decided by
 # the controller, which looks at the numbers themselves.
 ANY_RESIDUAL = 1e20
+NAMES = {"rho": "rho", "sigma": "proximal_weight"}  # as settings
 DECIMALS = 20  # of numbers in the code that OSQP generates
 
 
@@ -91,8 +92,8 @@ def _set_up(values: Values) -> osqp.OSQP:
     for name, value in settings.items():
         if not np.isclose(float(f"{value:.{DECIMALS}f}"), value, rtol=1e-6, atol=0.0):
             raise InputError(
-                f"mh_qp.osqp.{name} = {value:g} is too small for the code that OSQP generates, "
-                f"which has {DECIMALS} decimals"
+                f"mh_qp.admm.{NAMES[name]} = {value:g} is too small for the code that OSQP "
+                f"generates, which has {DECIMALS} decimals"
             )
     pattern = matrix_pattern(values.sizes)
     rows, variables = pattern.shape

@@ -7,11 +7,12 @@ from typing import Any
 
 from qpmpc.codegen.generate import Precision, Solver
 from qpmpc.codegen.pil import PilResult, processor_in_the_loop
-from qpmpc.controllers.factory import ControllerSettings
-from qpmpc.cycles import Cycle
+from qpmpc.controllers.base import Progress
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.report.provenance import provenance
-from qpmpc.simulate import Progress, as_fraction
-from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.trip import Trip
+from qpmpc.verification.dynamic_programming import DpSettings, solve_dp
+from qpmpc.verification.dynamic_programming.controller import as_fraction
 
 ITERATIONS = (10, 25, 50, 100)
 Job = Callable[[str], Progress]
@@ -58,8 +59,7 @@ def job_count(
 
 
 def embedded_pareto(
-    cycle: Cycle,
-    vehicle: Vehicle,
+    trip: Trip,
     settings: ControllerSettings,
     precisions: Sequence[Precision],
     solvers: Sequence[Solver],
@@ -70,7 +70,7 @@ def embedded_pareto(
 
     Parameters
     ----------
-    cycle, vehicle, settings : the trip; the settings' iterations a step are replaced
+    trip, settings : what is driven; the settings' iterations per step are replaced
     precisions, solvers, iterations : of the firmware
     next_job : announces a job and returns where it reports its progress, see `job_count`
 
@@ -81,13 +81,13 @@ def embedded_pareto(
     InputError
         If the settings do not fit generated code.
     """
-    from qpmpc.verification.dynamic_programming import solve_dp
-
-    report = next_job(f"{cycle.name}, dynamic programming")
-    optimum = solve_dp(cycle, vehicle, settings.dp, as_fraction(report))
+    name = trip.cycle.name
+    report = next_job(f"{name}, dynamic programming")
+    grid = settings.of("dp", DpSettings())
+    optimum = solve_dp(trip.cycle, trip.vehicle, grid, as_fraction(report))
     results = []
     for solver, precision, count in product(solvers, precisions, iterations):
-        chosen = settings.with_settings({"mh_qp.osqp.iterations": count})
-        report = next_job(f"{cycle.name}, {solver} {precision} K = {count}")
-        results.append(processor_in_the_loop(cycle, vehicle, chosen, precision, report, solver))
+        chosen = settings.with_settings({"mh_qp.admm.iterations": count})
+        report = next_job(f"{name}, {solver} {precision} K = {count}")
+        results.append(processor_in_the_loop(trip, chosen, precision, report, solver))
     return Pareto(float(optimum.fuel_g.sum()), results)

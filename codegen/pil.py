@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpmpc.codegen.controller import RUNGS, InputBuilder
+from qpmpc.closed_loop import drive
+from qpmpc.codegen.controller import InputBuilder, decision_of
 from qpmpc.codegen.firmware import (
     STACK_RESERVED_BYTES,
     Footprint,
@@ -19,16 +20,12 @@ from qpmpc.codegen.firmware import (
 )
 from qpmpc.codegen.generate import Precision, Solver
 from qpmpc.codegen.values import values_of
-from qpmpc.controllers.base import Decision, Observation
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.controllers.base import Controller, Decision, Progress
 from qpmpc.controllers.mh_qp import MhQp
-from qpmpc.cycles import Cycle
-from qpmpc.preview.forecast import Trace
-from qpmpc.preview.stages import StageBuilder
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.results import Run
-from qpmpc.simulate import Progress, simulate
-from qpmpc.vehicle.parameters import Vehicle
-from qpmpc.vehicle.plant import Command, Plant
+from qpmpc.trip import Observation, Trip
+from qpmpc.vehicle.plant import Command
 
 Floats = NDArray[np.float64]
 CLOCKS_MHZ = (80, 300, 480)
@@ -139,51 +136,57 @@ class PilResult:
         }
 
 
-class _OnTarget:
-    """The firmware as a controller, with the Python controller deciding in the same states."""
+class _OnTarget(Controller):
+    """The firmware as a controller."""
 
     name = "mh-qp"
+    implementation = "c"
+    has_safety_layer = True  # in the firmware
 
-    def __init__(self, target: Target, inputs: InputBuilder, twin: MhQp, label: str) -> None:
+    def __init__(
+        self, trip: Trip, settings: ControllerSettings, target: Target, label: str
+    ) -> None:
+        super().__init__(trip, settings)
         self.solver_name = label
-        self._target, self._inputs, self._twin = target, inputs, twin
-        self.in_ = target.input_type()
+        self._target, self._inputs = target, InputBuilder(trip, self.settings.mh_qp)
+        self._in = target.input_type()
+        self.departure_instructions: list[int] = []
         self.instructions: list[int] = []
         self.flags: list[int] = []
-        self.commands: list[Command] = []
-        self.references: list[Command] = []
         self.stack_bytes = self.state_bytes = 0
 
-    def decide(self, seen: Observation) -> Decision:
-        """Ask the target, and the Python controller for comparison."""
-        self._inputs.fill(seen, self.in_)
-        answer = self._target.step(self.in_)
-        out = answer.out
-        command = Command(bool(out.engine_on), float(out.p_eng_w))
+    def depart(self, progress: Progress | None = None) -> None:
+        """Let the target solve its first plan, slice by slice."""
+        self._target.init()
+        left = int(self.settings.mh_qp.prepared)
+        self._inputs.fill(self.trip.start, self._in)
+        while left > 0:
+            answer = self._target.depart(self._in)
+            self.departure_instructions.append(answer.instructions)
+            left = answer.result
+
+    def step(self, seen: Observation) -> Decision:
+        """Ask the target."""
+        self._inputs.fill(seen, self._in)
+        answer = self._target.step(self._in)
         self.instructions.append(answer.instructions)
         self.flags.append(answer.result)
         self.stack_bytes, self.state_bytes = answer.stack_bytes, answer.state_bytes
-        self.commands.append(command)
-        self.references.append(self._twin.decide(seen).command)
-        planned = out.rung == 0
-        gap, sigma = (out.relaxation_gap, out.sigma) if planned else (np.nan, np.nan)
-        return Decision(command, RUNGS[out.rung], out.iterations, gap, sigma)
+        return decision_of(answer.out)
 
 
 def processor_in_the_loop(
-    cycle: Cycle,
-    vehicle: Vehicle,
+    trip: Trip,
     settings: ControllerSettings | None = None,
     precision: Precision = "f32",
     progress: Progress | None = None,
     solver: Solver = "admm",
 ) -> PilResult:
-    """Drive a cycle with the firmware in QEMU (mps2-an500, Cortex-M7) on the Python plant.
+    """Drive a trip with the firmware in QEMU (mps2-an500, Cortex-M7) on the Python plant.
 
     Parameters
     ----------
-    cycle, vehicle : the trip
-    settings : of the controllers
+    trip, settings : what is driven, and settings of the controllers
     precision : of the firmware
     progress : called as progress(steps done, steps in all)
     solver : of the firmware
@@ -196,55 +199,42 @@ def processor_in_the_loop(
         If the settings do not fit generated code.
     """
     settings = settings or ControllerSettings()
-    of_mpc, plant, truth = settings.mh_qp, Plant(vehicle), Trace.of(cycle, vehicle)
-    blocks = of_mpc.horizon.block_count(truth.steps)
-    values = values_of(vehicle, of_mpc, settings.rule_based, blocks)
-    preview = StageBuilder(vehicle, truth, truth, of_mpc.horizon)
-    twin = MhQp("mh-qp", plant, truth, truth, of_mpc, settings.rule_based)
+    blocks = settings.mh_qp.horizon.block_count(trip.steps)
+    values = values_of(trip.vehicle, settings.mh_qp, settings.rule_based, blocks)
+    twin = MhQp(trip, settings)
+    commands: list[Command] = []
+    references: list[Command] = []
+
+    def compare(seen: Observation, decision: Decision) -> None:
+        commands.append(decision.command)
+        references.append(twin.decide(seen).command)
+
     with TemporaryDirectory(prefix="qpmpc-pil-") as scratch:
         folder = Path(scratch)
         elf = build_firmware(values, precision, folder, solver)
         with Target(elf, values, precision, folder) as target:
-            label = f"generated {solver} {precision} on cortex-m7"
-            firmware = _OnTarget(target, InputBuilder(preview, truth), twin, label)
-            target.init()
-            departure = _depart(target, firmware, vehicle, truth) if of_mpc.prepared else []
+            label = f"{solver} {precision} on cortex-m7"
+            firmware = _OnTarget(trip, settings, target, label)
             start = perf_counter()
-            run = simulate(cycle, firmware, vehicle, progress=progress)
+            run = drive(trip, firmware, on_step=compare, progress=progress)
             seconds = perf_counter() - start
         memory = footprint(elf)
-    in_python = settings.with_settings({"mh_qp.solver": "osqp"})
-    reference = simulate(cycle, "mh-qp", vehicle, settings=in_python)
     return PilResult(
         target="cortex-m7",
         solver=solver,
         precision=precision,
         iterations=values.iterations,
         run=run,
-        reference=reference,
+        reference=drive(trip, MhQp(trip, settings)),
         instructions=np.array(firmware.instructions),
-        departure_instructions=np.array(departure, dtype=np.int64),
-        command_w=np.array([c.p_eng_w for c in firmware.commands]),
-        reference_w=np.array([c.p_eng_w for c in firmware.references]),
-        command_on=np.array([c.engine_on for c in firmware.commands]),
-        reference_on=np.array([c.engine_on for c in firmware.references]),
+        departure_instructions=np.array(firmware.departure_instructions, dtype=np.int64),
+        command_w=np.array([c.p_eng_w for c in commands]),
+        reference_w=np.array([c.p_eng_w for c in references]),
+        command_on=np.array([c.engine_on for c in commands]),
+        reference_on=np.array([c.engine_on for c in references]),
         flags=np.array(firmware.flags),
         footprint=memory,
         state_bytes=firmware.state_bytes,
         stack_bytes=firmware.stack_bytes,
-        steps_per_s=cycle.steps / seconds,
+        steps_per_s=trip.steps / seconds,
     )
-
-
-def _depart(target: Target, firmware: _OnTarget, vehicle: Vehicle, truth: Trace) -> list[int]:
-    """Let the target solve its first plan; returns the instructions of each slice."""
-    trip = vehicle.trip
-    demand_w, speed_mps = float(truth.demand_w[0]), float(truth.speed_mps[0])
-    start = Observation(0, trip.soc_init, trip.t_cl_init_degc, False, demand_w, speed_mps)
-    firmware._inputs.fill(start, firmware.in_)
-    counts, left = [], 1
-    while left > 0:
-        answer = target.depart(firmware.in_)
-        counts.append(answer.instructions)
-        left = answer.result
-    return counts

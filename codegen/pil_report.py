@@ -16,7 +16,7 @@ from qpmpc.codegen.pil import PilResult
 from qpmpc.files import json_text, write_bytes, write_text
 from qpmpc.report.columns import violations_text
 from qpmpc.report.provenance import provenance
-from qpmpc.solvers.osqp import OsqpSettings
+from qpmpc.solvers.settings import AdmmSettings
 
 FLIPS_SHOWN = 8
 SHOWN_CYCLES_AN_INSTRUCTION = 1.5
@@ -59,8 +59,9 @@ def pil_lines(result: PilResult) -> list[str]:
     ]
     flips = result.flips
     if len(flips):
-        sigma = result.run.trajectory.sigma
-        shown = ", ".join(f"{k} s (sigma {sigma[k]:.2f})" for k in flips[:FLIPS_SHOWN].tolist())
+        on_share = result.run.trajectory.on_share
+        places = flips[:FLIPS_SHOWN].tolist()
+        shown = ", ".join(f"{k} s (on-share {on_share[k]:.2f})" for k in places)
         more = ", ..." if len(flips) > FLIPS_SHOWN else ""
         lines.append(f"on/off differs at    {shown}{more}")
     return lines
@@ -94,7 +95,7 @@ def write_pareto(pareto: Pareto, folder: Path) -> list[str]:
         return [f"{folder / stem}.json written; {NO_MATPLOTLIB}"]
     from qpmpc.codegen.pil_pictures import draw_pareto, draw_pil
 
-    default = OsqpSettings().iterations
+    default = AdmmSettings().iterations
     shown = min(pareto.results, key=lambda result: abs(result.iterations - default))
     picture = draw_pareto(data["runs"])
     write_bytes(folder / f"{stem}.png", picture)

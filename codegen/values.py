@@ -5,16 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpmpc.controllers import mh_qp, planner, safety
-from qpmpc.controllers.mh_qp import PLAN_VALID_STEPS, MhQpSettings
-from qpmpc.controllers.planner import DEPARTURE_LINEARISATIONS, WARM_UP_STEPS
-from qpmpc.controllers.rule_based import RuleBasedSettings
+from qpmpc.controllers import qp_planner, receding_horizon, safety
+from qpmpc.controllers.qp_planner import DEPARTURE_LINEARISATIONS, WARM_UP_STEPS
+from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS
+from qpmpc.controllers.settings import MhQpSettings, RuleBasedSettings
 from qpmpc.errors import InputError
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp import linearisation, stage_qp
 from qpmpc.qp.coolant import radiator_w_per_k
 from qpmpc.qp.stage_qp import T_CL_MAX_MARGIN_K
 from qpmpc.solvers import base
+from qpmpc.solvers.settings import AdmmSettings
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.engine import OptimalLine
 from qpmpc.vehicle.parameters import Vehicle
@@ -24,8 +25,11 @@ EQUALITY_WIDTH = 1e-4  # solver units
 
 # What the C code has in common with the Python controller, by module: names in C and their values.
 CONSTANTS: dict[str, dict[str, float]] = {
-    mh_qp.__name__: {"ON_THRESHOLD": mh_qp.ON_THRESHOLD, "LEAST_SIZE_W": mh_qp.LEAST_SIZE_W},
-    planner.__name__: {"FAILURES_FORGIVEN": planner.FAILURES_FORGIVEN},
+    receding_horizon.__name__: {"ON_THRESHOLD": receding_horizon.ON_THRESHOLD},
+    qp_planner.__name__: {
+        "FAILURES_FORGIVEN": qp_planner.FAILURES_FORGIVEN,
+        "LEAST_SIZE_W": qp_planner.LEAST_SIZE_W,
+    },
     linearisation.__name__: {
         "COLDEST_DEGC": linearisation.COLDEST_DEGC,
         "HOTTEST_DEGC": linearisation.HOTTEST_DEGC,
@@ -128,9 +132,10 @@ def values_of(
     Raises
     ------
     InputError
-        If there is no long horizon, its number of blocks is open, or the terminal band is so
-        narrow that the solver would take it for an equality.
+        If there is no long horizon, its number of blocks is open, the terminal band is so narrow
+        that the solver would take it for an equality, or a setting is one of Python's solvers.
     """
+    _refuse_unknown(settings)
     model = PwaModel.of(vehicle, settings.pwa)
     line, maps = OptimalLine(vehicle.engine), BatteryMaps(vehicle.battery)
     blocks = settings.horizon.blocks if blocks is None else blocks
@@ -179,11 +184,19 @@ def values_of(
         ),
         scalars=scalars,
         arrays=arrays,
-        iterations=settings.osqp.iterations,
-        departure_iterations=settings.osqp.cold_iterations,
+        iterations=settings.admm.iterations,
+        departure_iterations=settings.admm.cold_iterations,
         duration_exponent=settings.scaling.duration_exponent,
         min_on_s=rules.min_on_s,
     )
+
+
+def _refuse_unknown(settings: MhQpSettings) -> None:
+    """Refuse the settings that generated code does not have."""
+    if settings.solver is not None:
+        raise InputError(f"generated C has a solver of its own, not mh_qp.solver={settings.solver}")
+    if settings.admm.status_tolerance != AdmmSettings().status_tolerance:
+        raise InputError("generated C has no mh_qp.admm.status_tolerance: it never stops early")
 
 
 def _array(values: ArrayLike) -> NDArray[np.float64]:
@@ -219,7 +232,7 @@ def _plant(vehicle: Vehicle, line: OptimalLine, maps: BatteryMaps) -> dict[str, 
 
 
 def _problem(vehicle: Vehicle, model: PwaModel, settings: MhQpSettings) -> dict[str, float]:
-    qp, units, osqp = settings.qp, settings.scaling, settings.osqp
+    qp, units, admm = settings.qp, settings.scaling, settings.admm
     battery, thermal, soc_init = vehicle.battery, vehicle.thermal, vehicle.trip.soc_init
     return {
         "battery_energy_j": model.battery_energy_j,
@@ -235,11 +248,11 @@ def _problem(vehicle: Vehicle, model: PwaModel, settings: MhQpSettings) -> dict[
         "unit_t_k": units.t_cl_k,
         "unit_power_w": units.power_w,
         "unit_fuel_g_per_s": units.fuel_g_per_s,
-        "rho": osqp.rho,
-        "inverse_rho": 1.0 / osqp.rho,
-        "rho_equality": osqp.rho * EQUALITY_RHO_FACTOR,
-        "sigma": osqp.sigma,
-        "relaxation": osqp.relaxation,
+        "rho": admm.rho,
+        "inverse_rho": 1.0 / admm.rho,
+        "rho_equality": admm.rho * EQUALITY_RHO_FACTOR,
+        "sigma": admm.proximal_weight,
+        "relaxation": admm.relaxation,
     }
 
 

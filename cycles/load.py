@@ -6,10 +6,17 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 from qpmpc.cycles.breakpoints import read_breakpoints
-from qpmpc.cycles.catalogue import CatalogueEntry, catalogue, cycle_names
+from qpmpc.cycles.catalogue import CatalogueEntry, catalogue
 from qpmpc.cycles.cycle import Cycle
 from qpmpc.cycles.read_csv import read_csv
-from qpmpc.errors import InputError
+from qpmpc.names import Names, Shipped, unknown
+
+# an added name leads to a Cycle, or to the path of a CSV file
+CYCLES = Names(
+    "cycle",
+    {entry.name: Shipped(entry.data) for entry in catalogue()},
+    also=", or a CSV file",
+)
 
 
 def load_cycle(name_or_path: str | os.PathLike[str]) -> Cycle:
@@ -31,12 +38,13 @@ def load_cycle(name_or_path: str | os.PathLike[str]) -> Cycle:
     for entry in catalogue():
         if entry.name == name:
             return _shipped(entry)
+    if name in CYCLES:
+        found = CYCLES.find(name)
+        return found if isinstance(found, Cycle) else read_csv(Path(found), name=name)
     path = Path(name)
     # os.path: unlike Path.exists it does not raise on an impossible name
     if path.suffix == "" and path.name == name and not os.path.exists(name):  # noqa: PTH110
-        raise InputError(
-            f"unknown cycle {name!r}: give one of {', '.join(cycle_names())}, or a CSV file"
-        )
+        raise unknown("cycle", name, CYCLES.names(), ", or a CSV file")
     return read_csv(path)
 
 

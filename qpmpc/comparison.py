@@ -1,36 +1,135 @@
-"""Comparison of runs: savings over the rules, distance from the optimum."""
+"""Several controllers on several cycles: run them, set them against each other, report."""
 
-from collections.abc import Sequence
-from typing import Any
+import os
+from collections.abc import Callable, Sequence
+from io import StringIO
+from pathlib import Path
+from typing import Any, overload
 
-from qpmpc.results import Run
+from rich.console import Console
 
-REFERENCE, OPTIMUM = "rule-based", "dp"
+from qpmpc.closed_loop import drive
+from qpmpc.controllers.base import Controller, Progress
+from qpmpc.controllers.receding_horizon import Planner
+from qpmpc.controllers.settings import ControllerSettings
+from qpmpc.cycles import Cycle
+from qpmpc.errors import InputError
+from qpmpc.files import json_text, write_text
+from qpmpc.registry import ControllerLike, check_controllers, make_controller
+from qpmpc.report.columns import COMPARE_COLUMNS, notes
+from qpmpc.report.table import print_rows
+from qpmpc.report.write import comparison_html, write_comparison
+from qpmpc.results import Run, compare_runs
+from qpmpc.simulation import CycleLike, SettingsLike, VehicleLike, prepared
+from qpmpc.trip import Trip, as_trip
+
+DEFAULT_CONTROLLERS = ("rule-based", "mh-qp-paper", "mh-qp")
+PRINTED_WIDTH = 200
+ONE = (str, type, Controller, Planner)  # what is one controller, not several
 
 
-def compare_runs(runs: Sequence[Run]) -> list[dict[str, Any]]:
-    """Return the summary of each run, set against the others on its cycle.
+class Runs(Sequence[Run]):
+    """Runs with one vehicle, in the order in which they were made.
 
-    saving_vs_rule_percent = 100 (1 - m / m_rule),   fuel_above_dp_percent = 100 (m / m_dp - 1)
-
-    with m the SOC-balanced fuel. Null where there is no such run on the cycle, or it burns
-    nothing. `comparable` of a run says whether its own m can be trusted (see `Run`).
+    Parameters
+    ----------
+    runs : any number
+    settings : of the controllers, as they were run
     """
-    balanced = {(run.cycle, run.controller): run.fuel_soc_balanced_g for run in runs}
 
-    rows = []
-    for run in runs:
-        share = {
-            other: run.fuel_soc_balanced_g / balanced[run.cycle, other]
-            for other in (REFERENCE, OPTIMUM)
-            if balanced.get((run.cycle, other), 0.0) > 0.0
-        }
-        rule, optimum = share.get(REFERENCE), share.get(OPTIMUM)
-        rows.append(
-            {
-                **run.summary(),
-                "saving_vs_rule_percent": None if rule is None else 100.0 * (1.0 - rule),
-                "fuel_above_dp_percent": None if optimum is None else 100.0 * (optimum - 1.0),
-            }
-        )
-    return rows
+    def __init__(self, runs: Sequence[Run], settings: ControllerSettings | None = None) -> None:
+        self._runs = list(runs)
+        self.settings = settings or ControllerSettings()
+
+    @overload
+    def __getitem__(self, index: int) -> Run: ...
+    @overload
+    def __getitem__(self, index: slice) -> "Runs": ...
+    def __getitem__(self, index: int | slice) -> "Run | Runs":
+        if isinstance(index, slice):
+            return Runs(self._runs[index], self.settings)
+        return self._runs[index]
+
+    def __len__(self) -> int:
+        return len(self._runs)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the figures of each run, savings and distances among them; see `compare_runs`."""
+        return compare_runs(self._runs)
+
+    def remarks(self) -> list[str]:
+        """Return what a reader of the table must know, a line each."""
+        said = dict.fromkeys(remark for run in self._runs for remark in run.remarks)
+        return [*notes(self.rows()), *said]
+
+    def to_html(self, file: str | os.PathLike[str]) -> Path:
+        """Write the report: one page with table, pictures and settings that needs no other file.
+
+        Raises
+        ------
+        InputError
+            If there is no run, or matplotlib is not installed.
+        """
+        if not self._runs:
+            raise InputError("there is no run to report")
+        path = Path(file)
+        write_text(path, comparison_html(self._runs, self.rows(), self.settings))
+        return path
+
+    def to_json(self, file: str | os.PathLike[str]) -> Path:
+        """Write the figures as ``{"runs": [...]}``."""
+        path = Path(file)
+        write_text(path, json_text({"runs": self.rows()}))
+        return path
+
+    def write(self, folder: str | os.PathLike[str]) -> list[str]:
+        """Write report, pictures, trajectories (CSV) and figures (JSON); returns remarks."""
+        return write_comparison(self._runs, self.rows(), self.settings, Path(folder))
+
+    def __str__(self) -> str:
+        if not self._runs:
+            return "no runs"
+        text = StringIO()
+        console = Console(file=text, width=PRINTED_WIDTH, highlight=False)
+        print_rows(console, self.rows(), COMPARE_COLUMNS, "cycle")
+        return "\n".join([text.getvalue().rstrip(), *self.remarks()])
+
+
+def compare(
+    cycles: CycleLike | Sequence[CycleLike],
+    controllers: ControllerLike | Sequence[ControllerLike] = DEFAULT_CONTROLLERS,
+    vehicle: VehicleLike | None = None,
+    *,
+    settings: SettingsLike | None = None,
+    next_job: Callable[[str], Progress] | None = None,
+) -> Runs:
+    """Drive every cycle with every controller, one after the other.
+
+    Parameters
+    ----------
+    cycles, controllers : one or several, each as `simulate` takes it
+    vehicle, settings : as of `simulate`
+    next_job : called with the title of each run; returns where it reports its progress
+
+    Raises
+    ------
+    InputError
+        If a name, a file or a setting cannot be used, or one is given twice; before any run.
+    """
+    several = [cycles] if isinstance(cycles, str | os.PathLike | Cycle | Trip) else list(cycles)
+    wanted = [controllers] if isinstance(controllers, ONE) else list(controllers)
+    check_controllers([what for what in wanted if isinstance(what, str)])
+    trips: list[Trip] = []
+    chosen = ControllerSettings()
+    for cycle in several:
+        trip, chosen = prepared(as_trip(cycle, vehicle, None), settings, wanted)
+        if trip.cycle.name in [other.cycle.name for other in trips]:
+            raise InputError(f"cycle {trip.cycle.name!r} is named twice")
+        trips.append(trip)
+    runs = []
+    for trip in trips:  # one after the other, so that step times are not disturbed
+        for what in wanted:
+            name = what if isinstance(what, str) else what.name
+            report = next_job(f"{trip.cycle.name}, {name}") if next_job is not None else None
+            runs.append(drive(trip, make_controller(what, trip, chosen), progress=report))
+    return Runs(runs, chosen)

@@ -1,5 +1,6 @@
 """Results of a run: trajectories, the figures drawn from them, JSON."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Self
 
@@ -13,6 +14,7 @@ from qpmpc.vehicle.plant import PlantState, StepFlows
 
 Floats = NDArray[np.float64]
 
+REFERENCE, OPTIMUM = "rule-based", "dp"  # controllers that others are compared with
 COMPARABLE_SHARE = 0.03  # largest SOC correction, as a share of fuel, of a comparable run
 
 
@@ -41,7 +43,7 @@ class Trajectory:
     step_time_s: Floats
     iterations: NDArray[np.int64]
     relaxation_gap: Floats
-    sigma: Floats
+    on_share: Floats
     fallback: list[str]
 
     @classmethod
@@ -65,7 +67,7 @@ class Trajectory:
         self.fuel_g[t], self.coolant_w[t] = flows.fuel_g, flows.coolant_w
         self.power_excess_w[t] = flows.power_excess_w
         self.iterations[t] = decision.iterations
-        self.relaxation_gap[t], self.sigma[t] = decision.relaxation_gap, decision.sigma
+        self.relaxation_gap[t], self.on_share[t] = decision.relaxation_gap, decision.on_share
         self.fallback[t] = decision.fallback
 
 
@@ -76,6 +78,8 @@ class Run:
     Attributes
     ----------
     cycle, controller, solver : names; solver is empty where there is none
+    implementation : language that the controller ran in
+    remarks : what a user should know of the choices made for this run, a line each
     vehicle : parameters, overrides included
     trajectory : second by second
     """
@@ -83,6 +87,8 @@ class Run:
     cycle: str
     controller: str
     solver: str
+    implementation: str
+    remarks: tuple[str, ...]
     vehicle: Vehicle
     distance_km: float
     trajectory: Trajectory
@@ -119,8 +125,8 @@ class Run:
         tr, battery, thermal = self.trajectory, self.vehicle.battery, self.vehicle.thermal
         step_ms = tr.step_time_s[np.isfinite(tr.step_time_s)] * 1e3
         gap = tr.relaxation_gap[np.isfinite(tr.relaxation_gap)]
-        sigma = tr.sigma[np.isfinite(tr.sigma)]
-        integral = (sigma < INTEGRAL) | (sigma > 1.0 - INTEGRAL)
+        share = tr.on_share[np.isfinite(tr.on_share)]
+        integral = (share < INTEGRAL) | (share > 1.0 - INTEGRAL)
         return {
             "cycle": self.cycle,
             "controller": self.controller,
@@ -147,7 +153,7 @@ class Run:
             },
             "fallback_steps": sum(1 for rung in tr.fallback if rung),
             "relaxation_gap": {"max": _max(gap), "mean": float(gap.mean()) if len(gap) else None},
-            "sigma_integral_share": float(integral.mean()) if len(sigma) else None,
+            "sigma_integral_share": float(integral.mean()) if len(share) else None,
             "step_time_ms": {
                 "median": float(np.median(step_ms)) if len(step_ms) else None,
                 "p99": float(np.percentile(step_ms, 99)) if len(step_ms) else None,
@@ -155,9 +161,11 @@ class Run:
             },
             "solver": {
                 "name": self.solver or None,
+                "implementation": self.implementation,
                 "iterations_max": int(tr.iterations.max()) if self.solver else None,
                 "iterations_median": float(np.median(tr.iterations)) if self.solver else None,
             },
+            "remarks": list(self.remarks),
         }
 
 
@@ -170,3 +178,31 @@ def _excess(values: Floats, low: float, high: float) -> float:
 
 def _max(values: Floats) -> float | None:
     return float(values.max()) if len(values) else None
+
+
+def compare_runs(runs: Sequence[Run]) -> list[dict[str, Any]]:
+    """Return the summary of each run, set against the others on its cycle.
+
+    saving_vs_rule_percent = 100 (1 - m / m_rule),   fuel_above_dp_percent = 100 (m / m_dp - 1)
+
+    with m the SOC-balanced fuel. Null where there is no such run on the cycle, or it burns
+    nothing. `comparable` of a run says whether its own m can be trusted (see `Run`).
+    """
+    balanced = {(run.cycle, run.controller): run.fuel_soc_balanced_g for run in runs}
+
+    rows = []
+    for run in runs:
+        share = {
+            other: run.fuel_soc_balanced_g / balanced[run.cycle, other]
+            for other in (REFERENCE, OPTIMUM)
+            if balanced.get((run.cycle, other), 0.0) > 0.0
+        }
+        rule, optimum = share.get(REFERENCE), share.get(OPTIMUM)
+        rows.append(
+            {
+                **run.summary(),
+                "saving_vs_rule_percent": None if rule is None else 100.0 * (1.0 - rule),
+                "fuel_above_dp_percent": None if optimum is None else 100.0 * (optimum - 1.0),
+            }
+        )
+    return rows

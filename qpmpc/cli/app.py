@@ -7,7 +7,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from qpmpc import __version__
+from qpmpc._version import __version__
 from qpmpc.cli.benchmark import benchmark
 from qpmpc.cli.codegen import codegen
 from qpmpc.cli.compare import compare

@@ -29,19 +29,19 @@ def benchmark(
     """
     from qpmpc.cli.console import progress_bar, result_console, write_json
     from qpmpc.cli.inputs import check_outputs, load_vehicle_and_settings
-    from qpmpc.cycles import load_cycle
+    from qpmpc.trip import Trip
     from qpmpc.verification.benchmark.benchmark import benchmark as run
     from qpmpc.verification.benchmark.candidates import candidates
     from qpmpc.verification.benchmark.table import benchmark_table
 
     car, _ = load_vehicle_and_settings(vehicle, None)
     check_outputs(json_file, out)
-    trips = [load_cycle(name) for name in (CYCLES[:1] if quick else CYCLES)]
+    trips = [Trip(name, car) for name in (CYCLES[:1] if quick else CYCLES)]
     chosen = candidates()
     if quick:
         chosen = tuple(c for c in chosen if c.label in QUICK)
     with progress_bar(len(trips) * (len(chosen) + 1) + 1) as bar:
-        result = run(trips, car, chosen, bar.next_job)
+        result = run(trips, chosen, bar.next_job)
     write_json(result.as_data(), json_file)
     console = result_console(json_file)
     console.print(benchmark_table(result.rows))
@@ -52,5 +52,5 @@ def benchmark(
         from qpmpc.verification.benchmark.report import write_benchmark
 
         write_benchmark(result, car, out)
-        write_qps([record(trip, car) for trip in trips], problem_set(car), out)
+        write_qps([record(trip) for trip in trips], problem_set(car), out)
         console.print(f"{out / 'benchmark.html'} written, with pictures, JSON and QPs")

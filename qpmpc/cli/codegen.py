@@ -54,7 +54,7 @@ def codegen(
     of_solver = one_of(solver, SOLVERS, "solver")
     overrides = list(set_ or [])
     if iterations is not None:
-        overrides.append(f"mh_qp.osqp.iterations={iterations}")
+        overrides.append(f"mh_qp.admm.iterations={iterations}")
     car, settings = load_vehicle_and_settings(vehicle, overrides)
     values = values_of(car, settings.mh_qp, settings.rule_based)
     files = generate(values, folder, of_target, of_precision, of_solver)

@@ -41,33 +41,22 @@ def compare(
     """
     from qpmpc.cli.console import progress_bar, result_console, write_json
     from qpmpc.cli.inputs import check_outputs, load_vehicle_and_settings
-    from qpmpc.cli.table import print_rows
-    from qpmpc.comparison import compare_runs
-    from qpmpc.cycles import load_cycle
-    from qpmpc.errors import InputError
+    from qpmpc.comparison import compare as run
+    from qpmpc.registry import check_controllers
     from qpmpc.report.columns import COMPARE_COLUMNS, notes
-    from qpmpc.report.write import write_comparison
-    from qpmpc.runners import check_names, run
+    from qpmpc.report.table import print_rows
 
     names = [name.strip() for name in controllers.split(",")]
-    check_names(names)
+    check_controllers(names)
     car, settings = load_vehicle_and_settings(vehicle, set_)
-    trips = [load_cycle(cycle) for cycle in cycles]
-    for i, trip in enumerate(trips):
-        if trip.name in [other.name for other in trips[:i]]:
-            raise InputError(f"cycle {trip.name!r} is named twice")
     check_outputs(json_file, out)
-    runs = []
-    with progress_bar(len(trips) * len(names)) as bar:
-        for trip in trips:  # one after the other, so that step times are not disturbed
-            for name in names:
-                report = bar.next_job(f"{trip.name}, {name}")
-                runs.append(run(trip, name, car, settings, report))
-    rows = compare_runs(runs)
+    with progress_bar(len(cycles) * len(names)) as bar:
+        runs = run(cycles, names, car, settings=settings, next_job=bar.next_job)
+    rows = runs.rows()
     write_json({"runs": rows}, json_file)
     remarks = notes(rows)
     if out is not None:
-        remarks += write_comparison(runs, rows, settings, out)
+        remarks += runs.write(out)
     console = result_console(json_file)
     print_rows(console, rows, COMPARE_COLUMNS, "cycle")
     for remark in remarks:

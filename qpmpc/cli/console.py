@@ -10,8 +10,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from qpmpc.cli.inputs import STDOUT
+from qpmpc.controllers.base import Progress as Report
 from qpmpc.files import json_text, write_text
-from qpmpc.simulate import Progress as Report
 
 UNLIMITED_WIDTH = 1000
 

@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
-from qpmpc.controllers.factory import ControllerSettings, split_settings
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.files import check_file, check_folder
+from qpmpc.registry import split_settings
 from qpmpc.settings import parse_settings
 from qpmpc.vehicle import Vehicle, load_vehicle
 
@@ -20,9 +21,8 @@ def load_vehicle_and_settings(
     InputError
         If the vehicle cannot be loaded, or a key or value is not allowed.
     """
-    of_vehicle, of_controllers = split_settings(parse_settings(overrides or []))
-    vehicle = load_vehicle(name_or_file).with_settings(of_vehicle)
-    return vehicle, ControllerSettings().with_settings(of_controllers)
+    of_vehicle, settings = split_settings(parse_settings(overrides or []))
+    return load_vehicle(name_or_file).with_settings(of_vehicle), settings
 
 
 def check_outputs(json_file: Path | None, out: Path | None) -> None:

@@ -9,9 +9,8 @@ from qpmpc.cli.options import CycleArgument, JsonOption, OutOption, SetOption, V
 
 if TYPE_CHECKING:
     from qpmpc.codegen.generate import Precision, Solver
-    from qpmpc.controllers.factory import ControllerSettings
-    from qpmpc.cycles import Cycle
-    from qpmpc.vehicle import Vehicle
+    from qpmpc.controllers.settings import ControllerSettings
+    from qpmpc.trip import Trip
 
 
 def pil(
@@ -52,34 +51,33 @@ def pil(
 
       qpmpc pil nycc
 
-      qpmpc pil nedc-truncated --set mh_qp.osqp.iterations=25 --out results/pil
+      qpmpc pil nedc-truncated --set mh_qp.admm.iterations=25 --out results/pil
 
       qpmpc pil nycc --pareto --out results/pil
     """
     from qpmpc.cli.inputs import check_outputs, load_vehicle_and_settings
     from qpmpc.codegen.firmware import require_tools
     from qpmpc.codegen.generate import PRECISIONS, SOLVERS, one_of
-    from qpmpc.cycles import load_cycle
-    from qpmpc.runners import check_names
+    from qpmpc.registry import check_controllers
+    from qpmpc.trip import Trip
 
     one_of(target, ("cortex-m7",), "target")
     precisions = PRECISIONS if precision is None else (one_of(precision, PRECISIONS, "precision"),)
     solvers = SOLVERS if solver is None else (one_of(solver, SOLVERS, "solver"),)
     car, settings = load_vehicle_and_settings(vehicle, set_)
-    trip = load_cycle(cycle)
+    trip = Trip(cycle, car)
     check_outputs(json_file, out)
     if pareto:
-        check_names(["dp"])
+        check_controllers(["dp"])
     require_tools()
     if pareto:
-        _pareto(trip, car, settings, precisions, solvers, json_file, out)
+        _pareto(trip, settings, precisions, solvers, json_file, out)
     else:
-        _one_run(trip, car, settings, precisions[0], solvers[0], json_file, out)
+        _one_run(trip, settings, precisions[0], solvers[0], json_file, out)
 
 
 def _one_run(
-    trip: "Cycle",
-    car: "Vehicle",
+    trip: "Trip",
     settings: "ControllerSettings",
     precision: "Precision",
     solver: "Solver",
@@ -91,8 +89,8 @@ def _one_run(
     from qpmpc.codegen.pil_report import pil_lines, write_pil
 
     with progress_bar(1) as bar:
-        report = bar.next_job(f"{trip.name}, firmware {solver} {precision}")
-        result = processor_in_the_loop(trip, car, settings, precision, report, solver)
+        report = bar.next_job(f"{trip.cycle.name}, firmware {solver} {precision}")
+        result = processor_in_the_loop(trip, settings, precision, report, solver)
     write_json(result.summary(), json_file)
     console = result_console(json_file)
     for line in pil_lines(result):
@@ -103,8 +101,7 @@ def _one_run(
 
 
 def _pareto(
-    trip: "Cycle",
-    car: "Vehicle",
+    trip: "Trip",
     settings: "ControllerSettings",
     precisions: "tuple[Precision, ...]",
     solvers: "tuple[Solver, ...]",
@@ -116,7 +113,7 @@ def _pareto(
     from qpmpc.codegen.pil_report import pareto_table, write_pareto
 
     with progress_bar(job_count(precisions, solvers, ITERATIONS)) as bar:
-        found = embedded_pareto(trip, car, settings, precisions, solvers, bar.next_job)
+        found = embedded_pareto(trip, settings, precisions, solvers, bar.next_job)
     write_json(found.as_data(), json_file)
     console = result_console(json_file)
     console.print(pareto_table(found.rows()))

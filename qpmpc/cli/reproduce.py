@@ -37,12 +37,12 @@ def reproduce(
     from qpmpc.cli.console import progress_bar, result_console, write_json
     from qpmpc.cli.inputs import check_outputs, load_vehicle_and_settings
     from qpmpc.errors import InputError
-    from qpmpc.runners import check_names
+    from qpmpc.registry import check_controllers
     from qpmpc.verification.reproduction import Extent, job_count, run_study
 
     car, settings = load_vehicle_and_settings(vehicle, set_)
     check_outputs(json_file, out)
-    check_names(["dp"])
+    check_controllers(["dp"])
     if find_spec("matplotlib") is None:
         raise InputError("reproduce needs matplotlib: pip install 'qpmpc-iptm[plot,verification]'")
     from qpmpc.verification.reproduction.report import study_data, write_report

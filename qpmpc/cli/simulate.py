@@ -28,23 +28,24 @@ def simulate(
 
       qpmpc simulate my_trip.csv --vehicle prius-liion --out results
 
-      qpmpc simulate udds --set thermal.t_amb_degc=-15 --set mh_qp.osqp.iterations=25 --json -
+      qpmpc simulate udds --set thermal.t_amb_degc=-15 --set mh_qp.admm.iterations=25 --json -
     """
     from qpmpc.cli.console import progress_bar, result_console, write_json
     from qpmpc.cli.inputs import check_outputs, load_vehicle_and_settings
-    from qpmpc.cli.table import print_rows
-    from qpmpc.cycles import load_cycle
+    from qpmpc.registry import check_controllers
     from qpmpc.report.columns import SIMULATE_COLUMNS, notes
+    from qpmpc.report.table import print_rows
     from qpmpc.report.write import write_run
-    from qpmpc.runners import check_names, run
+    from qpmpc.simulation import simulate as run
+    from qpmpc.trip import Trip
 
-    check_names([controller])
+    check_controllers([controller])
     car, settings = load_vehicle_and_settings(vehicle, set_)
-    trip = load_cycle(cycle)
+    trip = Trip(cycle, car)
     check_outputs(json_file, out)
     with progress_bar(1) as bar:
-        report = bar.next_job(f"{trip.name}, {controller}")
-        finished = run(trip, controller, car, settings, report)
+        report = bar.next_job(f"{trip.cycle.name}, {controller}")
+        finished = run(trip, controller, settings=settings, progress=report)
     summary = finished.summary()
     write_json(summary, json_file)
     remarks = notes([summary])

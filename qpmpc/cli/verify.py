@@ -14,6 +14,15 @@ def verify(
     quick: Annotated[
         bool, typer.Option("--quick", help="Fewer cycles and samples: under two minutes.")
     ] = False,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--only",
+            metavar="GROUP",
+            help="This group of checks alone; repeatable. A wrong name lists all.",
+            show_default=False,
+        ),
+    ] = None,
     json_file: JsonOption = None,
     out: OutOption = None,
 ) -> None:
@@ -26,7 +35,7 @@ def verify(
 
       qpmpc verify --quick
 
-      qpmpc verify --out results
+      qpmpc verify --only qp --only bounds --out results
     """
     from time import perf_counter
 
@@ -36,6 +45,7 @@ def verify(
     from qpmpc.cli.inputs import check_outputs
     from qpmpc.errors import InputError
     from qpmpc.files import json_text, write_text
+    from qpmpc.registry import CHECKS
 
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
@@ -46,12 +56,14 @@ def verify(
         Context,
         Results,
         run_checks,
-        selected,
         verification_html,
     )
 
     check_outputs(json_file, out)
-    context, results, groups = Context(quick), Results(quick), selected(quick)
+    names = CHECKS.names() if only is None else tuple(dict.fromkeys(only))
+    groups = [CHECKS.find(name) for name in names]
+    groups = [group for group in groups if group.quick or not quick or only is not None]
+    context, results = Context(quick), Results(quick)
     with progress_bar(len(groups)) as bar:
         for group in groups:
             report, found, start = bar.next_job(group.title), [], perf_counter()

@@ -2,30 +2,27 @@
 
 import numpy as np
 
-from qpmpc.controllers.base import Observation
-from qpmpc.controllers.rule_based import RuleBased, RuleBasedSettings
-from qpmpc.preview.forecast import Trace
-from qpmpc.vehicle.plant import Plant
+from qpmpc.controllers.rule_based import RuleBased
+from qpmpc.controllers.settings import ControllerSettings, RuleBasedSettings
+from qpmpc.trip import Trip
 
 WIDEST_OFFSET = 0.2
 SCAN_STEP = 0.01
 BISECTIONS = 10
 
 
-def soc_drift(plant: Plant, truth: Trace, settings: RuleBasedSettings) -> float:
+def soc_drift(trip: Trip, rules: RuleBasedSettings) -> float:
     """SOC_end - SOC_init of the rules over a trip."""
-    rules = RuleBased(plant, settings)
-    state = plant.initial_state()
-    for t, (demand_w, speed_mps) in enumerate(
-        zip(truth.demand_w.tolist(), truth.speed_mps.tolist(), strict=True)
-    ):
-        seen = Observation(t, state.soc, state.t_cl_degc, state.engine_on, demand_w, speed_mps)
-        state, _ = plant.step(state, rules.decide(seen).command, demand_w, speed_mps)
-    return state.soc - plant.vehicle.trip.soc_init
+    driver, state = RuleBased(trip, rules=rules), trip.plant.initial_state()
+    for t in range(trip.steps):
+        seen = trip.observation(t, state)
+        command = driver.decide(seen).command
+        state, _ = trip.plant.step(state, command, seen.demand_w, seen.speed_mps)
+    return state.soc - trip.vehicle.trip.soc_init
 
 
-def balanced(plant: Plant, truth: Trace, settings: RuleBasedSettings) -> RuleBasedSettings:
-    """Return the settings with the SOC reference that balances this trip best.
+def balanced(trip: Trip, rules: RuleBasedSettings) -> RuleBasedSettings:
+    """Return the thresholds with the SOC reference that balances this trip best.
 
     The reference is sought outward from the initial SOC: the first offset at which the drift
     changes sign, refined by bisection; where it never does, the offset of the smallest drift.
@@ -34,8 +31,8 @@ def balanced(plant: Plant, truth: Trace, settings: RuleBasedSettings) -> RuleBas
     """
 
     def drift(offset: float) -> float:
-        trial = settings.model_copy(update={"soc_ref_offset": offset})
-        return soc_drift(plant, truth, trial)
+        trial = rules.model_copy(update={"soc_ref_offset": offset})
+        return soc_drift(trip, trial)
 
     seen = {0.0: drift(0.0)}
     direction = -1.0 if seen[0.0] > 0.0 else 1.0
@@ -54,4 +51,11 @@ def balanced(plant: Plant, truth: Trace, settings: RuleBasedSettings) -> RuleBas
             break
         previous = offset
     best = min(seen, key=lambda offset: abs(seen[offset]))
-    return settings.model_copy(update={"soc_ref_offset": best})
+    return rules.model_copy(update={"soc_ref_offset": best})
+
+
+def rule_based(trip: Trip, settings: ControllerSettings | None = None) -> RuleBased:
+    """Make the rules for one trip, charge-balanced if the settings say so."""
+    settings = settings or ControllerSettings()
+    rules = settings.rule_based
+    return RuleBased(trip, settings, balanced(trip, rules) if rules.balance else rules)

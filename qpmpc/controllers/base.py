@@ -1,40 +1,131 @@
-"""What a controller sees and says: one observation in, one decision out, every second."""
+"""The base of all controllers: one observation in, one decision out, every second."""
 
-from typing import NamedTuple, Protocol
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import ClassVar, NamedTuple
 
+from pydantic import BaseModel
+
+from qpmpc.controllers.safety import SafetyLayer
+from qpmpc.controllers.settings import ControllerSettings
+from qpmpc.errors import QpmpcError
+from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.plant import Command
 
-
-class Observation(NamedTuple):
-    """Measured at the start of a step; demand and speed are those of the step to come."""
-
-    step: int
-    soc: float
-    t_cl_degc: float
-    engine_on: bool
-    demand_w: float
-    speed_mps: float
+Progress = Callable[[int, int], None]
 
 
 class Decision(NamedTuple):
     """A command and how it came about.
 
     `fallback` names the rung of the degradation ladder that was used, empty if none.
-    `relaxation_gap` and `sigma` are nan for controllers without a relaxation.
+    `relaxation_gap` and `on_share` are nan for controllers without a relaxation.
     """
 
     command: Command
     fallback: str = ""
     iterations: int = 0
     relaxation_gap: float = float("nan")
-    sigma: float = float("nan")
+    on_share: float = float("nan")
 
 
-class Controller(Protocol):
-    """A causal controller; one instance drives one trip from its first step to its last."""
+class Controller(ABC):
+    """A causal controller; one instance belongs to one trip and drives it once.
 
-    name: str
-    solver_name: str
+    A subclass writes `step` and, where it has a memory or something to prepare, `depart`. Whatever
+    `step` returns, the safety layer makes the command admissible.
+
+    Parameters
+    ----------
+    trip : to be driven
+    settings : of all controllers
+
+    Attributes
+    ----------
+    name : under which results are reported; a class attribute will do
+    solver_name : of the QP or program solved each second, empty where there is none
+    implementation : language that the decisions are computed in
+    remarks : what a user should know of the choices made for this run, a line each
+    Settings : pydantic model of the controller's own settings, if any. With the name ``my-own``
+        its fields are reached as ``my_own.FIELD``, and their values by ``self.own_settings()``.
+    """
+
+    name: str = "own"
+    solver_name: str = ""
+    implementation: str = "python"
+    Settings: ClassVar[type[BaseModel] | None] = None
+    # a controller whose commands are admissible already, or are to be obeyed as they are
+    has_safety_layer: ClassVar[bool] = False
+    # whether it decides from second to second, so that the time of a step means something
+    decides_online: ClassVar[bool] = True
+
+    def __init__(self, trip: Trip, settings: ControllerSettings | None = None) -> None:
+        self.trip = trip
+        self.settings = settings or ControllerSettings()
+        self.remarks: list[str] = []
+        self.safety = SafetyLayer(trip.plant, self.settings.rule_based.heat_power_w)
+        self._under_way = False
+
+    def depart(self, progress: Progress | None = None) -> None:  # noqa: B027
+        """Get ready before the first second: set the memory, prepare what takes time.
+
+        Called once a run.
+
+        Parameters
+        ----------
+        progress : called as progress(done, in all) by whoever takes more than two seconds
+        """
+
+    @abstractmethod
+    def step(self, seen: Observation) -> Command | Decision:
+        """Choose the engine command of the coming second."""
 
     def decide(self, seen: Observation) -> Decision:
-        """Choose the engine command of the coming step."""
+        """Run one second: `step`, then the safety layer."""
+        if not self._under_way:
+            self.begin(self.trip)
+        made = self.step(seen)
+        decision = made if isinstance(made, Decision) else Decision(made)
+        if self.has_safety_layer:
+            return decision
+        return decision._replace(command=self.safety.admissible(decision.command, seen))
+
+    def begin(self, trip: Trip, progress: Progress | None = None) -> None:
+        """Start a run.
+
+        Raises
+        ------
+        QpmpcError
+            If the controller was made for another trip, or has driven and was not reset.
+        """
+        if not hasattr(self, "trip"):
+            raise QpmpcError(
+                f"{type(self).__name__}.__init__ must call super().__init__(trip, settings)"
+            )
+        if not trip.same_as(self.trip):
+            raise QpmpcError(
+                f"controller {self.name!r} was made for {self.trip!r} and cannot drive {trip!r}: "
+                "make one for this trip"
+            )
+        if self._under_way:
+            raise QpmpcError(
+                f"controller {self.name!r} has driven already: call reset() before another run"
+            )
+        self._under_way = True
+        self.depart(progress)
+
+    def reset(self) -> None:
+        """Make ready for another run of the same trip, which `depart` will begin."""
+        self._under_way = False
+
+    def own_settings(self) -> BaseModel:
+        """Return the values of `Settings`, with what the user set.
+
+        Raises
+        ------
+        InputError
+            If a value is not allowed.
+        """
+        if self.Settings is None:
+            raise QpmpcError(f"{type(self).__name__} declares no Settings")
+        return self.settings.of(self.name.replace("-", "_"), self.Settings())

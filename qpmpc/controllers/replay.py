@@ -1,26 +1,28 @@
 """Replay of a plan made for the whole trip, such as dynamic programming's."""
 
+from abc import abstractmethod
 from collections.abc import Sequence
 
-from qpmpc.controllers.base import Decision, Observation
+from qpmpc.controllers.base import Controller, Progress
+from qpmpc.trip import Observation
 from qpmpc.vehicle.plant import Command
 
 
-class Replay:
-    """Gives the planned command of each step, whatever the plant does.
+class Replay(Controller):
+    """Plans all commands of a trip at departure and gives them whatever the plant does."""
 
-    Parameters
-    ----------
-    name : under which results are reported
-    commands : one a step
-    """
+    has_safety_layer = True  # a plan that knows the plant is to be obeyed as it is
+    decides_online = False
+    _commands: Sequence[Command] = ()
 
-    solver_name = ""
+    @abstractmethod
+    def commands(self, progress: Progress | None) -> Sequence[Command]:
+        """Plan the whole trip: one command per step."""
 
-    def __init__(self, name: str, commands: Sequence[Command]) -> None:
-        self.name = name
-        self._commands = commands
+    def depart(self, progress: Progress | None = None) -> None:
+        """Plan the whole trip."""
+        self._commands = self.commands(progress)
 
-    def decide(self, seen: Observation) -> Decision:
+    def step(self, seen: Observation) -> Command:
         """Return the command planned for this step."""
-        return Decision(self._commands[seen.step])
+        return self._commands[seen.step]

@@ -1,6 +1,6 @@
 """Safety layer: makes any one-step command admissible, in closed form."""
 
-from qpmpc.controllers.base import Observation
+from qpmpc.trip import Observation
 from qpmpc.vehicle.engine import alpha_at
 from qpmpc.vehicle.plant import Command, Plant
 

@@ -1,5 +1,6 @@
 """The QP written in cvxpy, straight from its equations: to read, to change, to prototype with."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import cvxpy
@@ -85,6 +86,12 @@ class CvxpyTwin:
             *self._coolant(),
         ]
         self.objective = cp.Minimize(self._cost())
+        self.problem = cp.Problem(self.objective, self.constraints)
+
+    def add(self, cost_g: Any, constraints: Sequence[Any]) -> None:
+        """Add a convex cost in grams and constraints to the program."""
+        self.objective = cp.Minimize(self.objective.expr + cost_g)
+        self.constraints = [*self.constraints, *constraints]
         self.problem = cp.Problem(self.objective, self.constraints)
 
     def _declare_parameters(self) -> None:
@@ -243,7 +250,10 @@ class CvxpyTwin:
         QpmpcError
             If the solver finds no optimum.
         """
-        self.problem.solve(solver=solver, **options)
+        try:
+            self.problem.solve(solver=solver, **options)
+        except cp.SolverError as error:
+            raise QpmpcError(f"cvxpy twin: {solver}: {error}") from error
         if self.problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
             raise QpmpcError(f"cvxpy twin: {solver} ends with {self.problem.status!r}")
         return np.column_stack([np.asarray(self._x[var].value) for var in Var])

@@ -53,7 +53,7 @@ class QpSettings(BaseModel):
 
 @dataclass(frozen=True)
 class QpData:
-    """min 1/2 z^T P z + q^T z  s.t.  lower <= A z <= upper, in solver units.
+    """min 1/2 x^T P x + q^T x  s.t.  lower <= A x <= upper, in solver units.
 
     `hessian` is the diagonal of P; `a_data` the values of A in CSC order.
     """

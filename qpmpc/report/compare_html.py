@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, StrictUndefined
 
-from qpmpc.comparison import OPTIMUM, REFERENCE
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.report.columns import COMPARE_COLUMNS, Row, filled, notes
 from qpmpc.report.provenance import provenance
 from qpmpc.report.units import unit_of
-from qpmpc.results import INTEGRAL, Run
+from qpmpc.results import INTEGRAL, OPTIMUM, REFERENCE, Run
 
 
 def compare_html(
@@ -38,6 +37,8 @@ def compare_html(
     names = {"rule_based", *(run.controller.replace("-", "_") for run in runs)}
     if "mh_nlp" in names:
         names.add("mh_qp")  # has its horizon and limits
+    if settings.others:
+        names.add("others")
     template = files("qpmpc.report").joinpath("compare.html.j2").read_text("utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     return environment.from_string(template).render(
@@ -66,8 +67,8 @@ def compare_html(
 
 def _fractional_demand(run: Run) -> str:
     """Quartiles of the demand in the steps whose on-share was fractional, kW."""
-    sigma, demand = run.trajectory.sigma, run.trajectory.demand_w
-    there = demand[(sigma > INTEGRAL) & (sigma < 1.0 - INTEGRAL)] / 1e3
+    share, demand = run.trajectory.on_share, run.trajectory.demand_w
+    there = demand[(share > INTEGRAL) & (share < 1.0 - INTEGRAL)] / 1e3
     if len(there) == 0:
         return "-"
     low, high = np.percentile(there, [25, 75])
@@ -82,8 +83,13 @@ def _text(value: Any) -> str:
 def _remarks(rows: Sequence[Row], settings: ControllerSettings) -> list[str]:
     """What a reader must know before believing the table."""
     present = {row["controller"] for row in rows}
-    solvers = {row["controller"]: row["solver"]["name"] for row in rows if row["solver"]["name"]}
-    solved_by = ", ".join(f"{controller} by {solver}" for controller, solver in solvers.items())
+    solved_by = ", ".join(
+        dict.fromkeys(
+            f"{row['controller']} by {row['solver']['name']} ({row['solver']['implementation']})"
+            for row in rows
+            if row["solver"]["name"]
+        )
+    )
     remarks = [
         "Balanced fuel is the fuel burnt plus that which the difference between initial and final "
         "SOC is worth at the efficiency trip.eta_eq. Savings and distances compare balanced fuel.",
@@ -125,4 +131,4 @@ def _remarks(rows: Sequence[Row], settings: ControllerSettings) -> list[str]:
             for row in fallbacks
         )
         remarks.append(f"A fallback drove in place of the optimiser: {names}.")
-    return remarks
+    return [*remarks, *dict.fromkeys(remark for row in rows for remark in row["remarks"])]

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-import qpmpc
+from qpmpc._version import __version__
 
 PACKAGES = ("numpy", "scipy", "osqp")
 
@@ -15,7 +15,7 @@ def provenance() -> dict[str, str]:
     """Return what a reader needs in order to repeat the result or to judge its step times."""
     packages = {name: _version(name) for name in PACKAGES}
     return {
-        "qpmpc-iptm": qpmpc.__version__,
+        "qpmpc-iptm": __version__,
         "Python": platform.python_version(),
         **packages,
         "processor": f"{_processor()}, {os.cpu_count()} logical cores",

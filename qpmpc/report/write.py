@@ -1,12 +1,13 @@
 """Files of a result: CSV, JSON, pictures, the HTML report."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle
+from qpmpc.errors import InputError
 from qpmpc.files import json_text, write_bytes, write_text
 from qpmpc.report.pwa_curves import PwaCurve
 from qpmpc.report.trajectory_csv import trajectory_csv
@@ -54,15 +55,41 @@ def write_comparison(
             f"{folder}: trajectories (CSV) and compare.json written; no pictures and no report: "
             f"{missing} is not installed ({PLOT_EXTRA})"
         ]
+    pictures = _pictures(runs)
+    for cycle, picture in pictures.items():
+        write_bytes(folder / f"{cycle}.png", picture)
+    write_text(folder / "compare.html", comparison_html(runs, rows, settings, pictures))
+    return [f"{folder / 'compare.html'} written, with pictures, trajectories and compare.json"]
+
+
+def comparison_html(
+    runs: Sequence[Run],
+    rows: Sequence[dict[str, Any]],
+    settings: ControllerSettings,
+    pictures: Mapping[str, bytes] | None = None,
+) -> str:
+    """Return the report; its pictures are drawn if they are not given.
+
+    Raises
+    ------
+    InputError
+        If matplotlib is not installed.
+    """
+    missing = _missing("matplotlib")
+    if missing:
+        raise InputError(f"the report needs {missing}: {PLOT_EXTRA}")
     from qpmpc.report.compare_html import compare_html
+
+    return compare_html(runs, rows, settings, _pictures(runs) if pictures is None else pictures)
+
+
+def _pictures(runs: Sequence[Run]) -> dict[str, bytes]:
     from qpmpc.report.trajectories import draw_trajectories
 
-    pictures = {}
-    for cycle in dict.fromkeys(run.cycle for run in runs):
-        pictures[cycle] = draw_trajectories([run for run in runs if run.cycle == cycle])
-        write_bytes(folder / f"{cycle}.png", pictures[cycle])
-    write_text(folder / "compare.html", compare_html(runs, rows, settings, pictures))
-    return [f"{folder / 'compare.html'} written, with pictures, trajectories and compare.json"]
+    return {
+        cycle: draw_trajectories([run for run in runs if run.cycle == cycle])
+        for cycle in dict.fromkeys(run.cycle for run in runs)
+    }
 
 
 def write_cycle(cycle: Cycle, folder: Path) -> list[str]:

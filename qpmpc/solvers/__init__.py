@@ -1,12 +1,11 @@
-"""QP backends behind one interface."""
+"""QP backends behind one interface: `base` has it, `names` makes them by name."""
 
 from qpmpc.solvers.base import QpSolution, QpSolver, Status
-from qpmpc.solvers.osqp import Osqp, OsqpSettings
-from qpmpc.solvers.registry import make_solver, solver_names
+from qpmpc.solvers.names import make_solver, solver_names
+from qpmpc.solvers.settings import AdmmSettings
 
 __all__ = [
-    "Osqp",
-    "OsqpSettings",
+    "AdmmSettings",
     "QpSolution",
     "QpSolver",
     "Status",

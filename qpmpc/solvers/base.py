@@ -29,15 +29,15 @@ class QpSolution:
 
     Attributes
     ----------
-    z, y : primal and dual, y > 0 at an active upper bound
+    primal, dual : of the QP; a dual is above 0 at an active upper bound
     status : see `Status`
     iterations : of the solver's own kind
     solve_s, update_s : wall time of the solve alone and of bringing in new values before it, s;
         for reports only, never for decisions
     """
 
-    z: Floats
-    y: Floats
+    primal: Floats
+    dual: Floats
     status: Status
     iterations: int
     solve_s: float
@@ -45,11 +45,11 @@ class QpSolution:
 
     @property
     def usable(self) -> bool:
-        """Whether z may be acted on: solved or stopped at the limit, finite and in range."""
+        """Whether it may be acted on: solved or stopped at the limit, finite and in range."""
         return (
             self.status in (Status.SOLVED, Status.ITERATION_LIMIT)
-            and bool(np.abs(self.z).max() < LARGEST_PLAUSIBLE)
-            and bool(np.abs(self.y).max() < LARGEST_PLAUSIBLE)
+            and bool(np.abs(self.primal).max() < LARGEST_PLAUSIBLE)
+            and bool(np.abs(self.dual).max() < LARGEST_PLAUSIBLE)
         )
 
 
@@ -62,9 +62,9 @@ class QpSolver(Protocol):
         """Set up for the pattern of `structure`; called once a trip."""
 
     def solve(
-        self, data: QpData, z: Floats | None, y: Floats | None, cold: bool = False
+        self, data: QpData, primal: Floats | None, dual: Floats | None, cold: bool = False
     ) -> QpSolution:
-        """Solve with new values, starting at (z, y), or at zero where None.
+        """Solve with new values, starting at the given primal and dual, or at zero where None.
 
         `cold` says that the start is far from the solution: a solver with an iteration limit
         may then use its larger one.

@@ -57,7 +57,7 @@ class Clarabel(TimedSolver):
             b=np.concatenate(self._form.right_sides(data)),
         )
 
-    def _run(self, data: QpData, z: Floats | None, y: Floats | None) -> Outcome:
+    def _run(self, data: QpData, primal: Floats | None, dual: Floats | None) -> Outcome:
         result = self._solver.solve()
         dual = array(result.z)
         equalities = len(self._form.equalities.rows)

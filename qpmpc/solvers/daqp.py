@@ -58,7 +58,7 @@ class Daqp(TimedSolver):
         a = self._pattern.matrix_of(data.a_data).toarray()
         return np.diag(data.hessian), data.q, a, data.upper, data.lower
 
-    def _run(self, data: QpData, z: Floats | None, y: Floats | None) -> Outcome:
+    def _run(self, data: QpData, primal: Floats | None, dual: Floats | None) -> Outcome:
         x, _, flag, info = self._solver.solve()
         return Outcome(
             array(x), array(info["lam"]), _STATUS.get(flag, Status.FAILED), int(info["iterations"])

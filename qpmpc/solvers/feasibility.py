@@ -11,7 +11,7 @@ FEASIBILITY_TOLERANCE = 1e-7  # in solver units, of the linear programme
 
 
 def is_infeasible(structure: QpStructure, data: QpData) -> bool:
-    """Return whether min t s.t. lower - t <= A z <= upper + t, t >= 0 stays above zero."""
+    """Return whether min t s.t. lower - t <= A x <= upper + t, t >= 0 stays above zero."""
     variables = structure.shape[1]
     a = structure.matrix_of(data.a_data)
     above, below = np.isfinite(data.upper), np.isfinite(data.lower)

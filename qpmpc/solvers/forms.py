@@ -1,6 +1,6 @@
 """The forms of a QP that other solvers want: equalities apart, one-sided rows.
 
-The rows of `lower <= A z <= upper` are sorted once, at set-up; each step only picks values out
+The rows of `lower <= A x <= upper` are sorted once, at set-up; each step only picks values out
 of the data vector of A. A step whose rows have become equalities, or lost a bound, does not fit
 any more and has to be sorted anew.
 """
@@ -55,7 +55,7 @@ class PickedRows:
 
 
 class TwoSided:
-    """min 1/2 z'Pz + q'z  s.t.  A z = b,  l <= G z <= u.
+    """min 1/2 x'Px + q'x  s.t.  A x = b,  l <= G x <= u.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class TwoSided:
 
 
 class OneSided:
-    """min 1/2 z'Pz + q'z  s.t.  A z = b,  G z <= h: each side of a row is a row of its own.
+    """min 1/2 x'Px + q'x  s.t.  A x = b,  G x <= h: each side of a row is a row of its own.
 
     `all` holds the rows of A and, below them, those of G.
 

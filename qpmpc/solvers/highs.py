@@ -71,7 +71,7 @@ class Highs(TimedSolver):
         hessian.value_ = data.hessian
         self._solver.passModel(model)
 
-    def _run(self, data: QpData, z: Floats | None, y: Floats | None) -> Outcome:
+    def _run(self, data: QpData, primal: Floats | None, dual: Floats | None) -> Outcome:
         self._solver.run()
         status = _STATUS.get(self._solver.getModelStatus().name, Status.FAILED)
         iterations = max(int(self._solver.getInfo().qp_iteration_count), 0)

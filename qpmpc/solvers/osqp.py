@@ -1,18 +1,16 @@
 """OSQP, native and persistent, with a fixed number of iterations."""
 
 from time import perf_counter
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import osqp
-from pydantic import BaseModel, ConfigDict, Field
 
 from qpmpc.qp.stage_qp import QpData
 from qpmpc.qp.structure import QpStructure
 from qpmpc.solvers.base import Floats, QpSolution, Status, consistent, failed
 from qpmpc.solvers.forms import hessian_matrix
-
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+from qpmpc.solvers.settings import AdmmSettings
 
 # Of OSQP's own: no scaling, which would differ from step to step, no adaptation, no early exit.
 SAME_WORK: dict[str, Any] = {
@@ -35,35 +33,13 @@ _STATUS = {
 }
 
 
-class OsqpSettings(BaseModel):
-    """Settings of OSQP. Every step does the same arithmetic: no adaptation, no early exit.
-
-    Attributes
-    ----------
-    iterations : K, iterations a step
-    cold_iterations : iterations of a solve without warm start, at departure
-    rho, sigma, relaxation : ADMM's step size, proximal weight and over-relaxation
-    status_tolerance : on the residuals, absolute and relative, for the result to be called solved;
-        what comes of a step that is not, is used all the same
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    iterations: Annotated[int, Field(ge=1, le=100_000)] = 50
-    cold_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 4000
-    rho: Positive = 0.1
-    sigma: Positive = 1e-6
-    relaxation: Annotated[float, Field(gt=0.0, lt=2.0)] = 1.6
-    status_tolerance: Annotated[float, Field(gt=0.0, lt=1.0)] = 1e-3
-
-
 class Osqp:
     """Backend over the native OSQP interface; one instance serves one trip."""
 
     name = "osqp"
 
-    def __init__(self, settings: OsqpSettings | None = None) -> None:
-        self.settings = settings or OsqpSettings()
+    def __init__(self, settings: AdmmSettings | None = None) -> None:
+        self.settings = settings or AdmmSettings()
         self._solver: Any = None
         self._iterations = 0
         self._hessian: Floats = np.empty(0)
@@ -82,14 +58,14 @@ class Osqp:
             **SAME_WORK,
             max_iter=self._iterations,
             rho=self.settings.rho,
-            sigma=self.settings.sigma,
+            sigma=self.settings.proximal_weight,
             alpha=self.settings.relaxation,
             eps_abs=self.settings.status_tolerance,
             eps_rel=self.settings.status_tolerance,
         )
 
     def solve(
-        self, data: QpData, z: Floats | None, y: Floats | None, cold: bool = False
+        self, data: QpData, primal: Floats | None, dual: Floats | None, cold: bool = False
     ) -> QpSolution:
         """Update the values and run exactly K iterations (`cold_iterations` if `cold`)."""
         if not consistent(data):
@@ -101,16 +77,16 @@ class Osqp:
         self._solver.update(q=data.q, l=data.lower, u=data.upper, Ax=data.a_data, **changed)
         updated = perf_counter()
         self._solver.warm_start(
-            x=np.zeros_like(data.q) if z is None else z,
-            y=np.zeros_like(data.lower) if y is None else y,
+            x=np.zeros_like(data.q) if primal is None else primal,
+            y=np.zeros_like(data.lower) if dual is None else dual,
         )
         result = self._solver.solve(raise_error=False)
         done = perf_counter()
         if result.info.status == "interrupted":
             raise KeyboardInterrupt  # OSQP takes Ctrl-C away from Python while it solves
         return QpSolution(
-            z=np.asarray(result.x, dtype=float),
-            y=np.asarray(result.y, dtype=float),
+            primal=np.asarray(result.x, dtype=float),
+            dual=np.asarray(result.y, dtype=float),
             status=_STATUS.get(result.info.status, Status.FAILED),
             iterations=int(result.info.iter),
             solve_s=done - updated,

@@ -48,7 +48,7 @@ class Piqp(TimedSolver):
             "h_u": high,
         }
 
-    def _run(self, data: QpData, z: Floats | None, y: Floats | None) -> Outcome:
+    def _run(self, data: QpData, primal: Floats | None, dual: Floats | None) -> Outcome:
         status = self._solver.solve()
         result = self._solver.result
         return Outcome(

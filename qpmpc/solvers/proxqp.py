@@ -65,14 +65,14 @@ class Proxqp(TimedSolver):
             "u": high,
         }
 
-    def _run(self, data: QpData, z: Floats | None, y: Floats | None) -> Outcome:
-        if z is None or y is None:
+    def _run(self, data: QpData, primal: Floats | None, dual: Floats | None) -> Outcome:
+        if primal is None or dual is None:
             self._start(self._pattern, data)  # what the last solve left behind can mislead it
             self._solver.settings.initial_guess = self._guess.EQUALITY_CONSTRAINED_INITIAL_GUESS
             self._solver.solve()
         else:
             self._solver.settings.initial_guess = self._guess.WARM_START
-            self._solver.solve(z, *self._form.part(y))
+            self._solver.solve(primal, *self._form.part(dual))
         result = self._solver.results
         status = _STATUS.get(result.info.status.name, Status.FAILED)
         if status is Status.ITERATION_LIMIT and is_infeasible(self._pattern, data):

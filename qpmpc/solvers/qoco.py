@@ -61,7 +61,7 @@ class Qoco(TimedSolver):
             self._form.inequalities.values(data),
         )
 
-    def _run(self, data: QpData, z: Floats | None, y: Floats | None) -> Outcome:
+    def _run(self, data: QpData, primal: Floats | None, dual: Floats | None) -> Outcome:
         result = self._solver.solve()
         status = _STATUS.get(result.status, Status.FAILED)
         if status is not Status.SOLVED and is_infeasible(self._pattern, data):

@@ -45,17 +45,18 @@ class Scs(TimedSolver):
             verbose=False,
         )
 
-    def _run(self, data: QpData, z: Floats | None, y: Floats | None) -> Outcome:
-        if z is None or y is None:
+    def _run(self, data: QpData, primal: Floats | None, dual: Floats | None) -> Outcome:
+        if primal is None or dual is None:
             result = self._solver.solve(warm_start=False)
         else:
-            dual = np.concatenate(self._form.part(y))
-            result = self._solver.solve(warm_start=True, x=z, y=dual, s=self._b - self._a @ z)
-        dual = array(result["y"])
+            parts = np.concatenate(self._form.part(dual))
+            slack = self._b - self._a @ primal
+            result = self._solver.solve(warm_start=True, x=primal, y=parts, s=slack)
+        found = array(result["y"])
         equalities = len(self._form.equalities.rows)
         return Outcome(
             array(result["x"]),
-            self._form.join(dual[:equalities], dual[equalities:]),
+            self._form.join(found[:equalities], found[equalities:]),
             _STATUS.get(result["info"]["status"], Status.FAILED),
             int(result["info"]["iter"]),
         )

@@ -47,9 +47,9 @@ class ThroughQpsolvers(TimedSolver):
         p, g, a = matrices
         self._problem: Any = self.module.Problem(p, data.q, g, h, a, b)
 
-    def _run(self, data: QpData, z: Floats | None, y: Floats | None) -> Outcome:
+    def _run(self, data: QpData, primal: Floats | None, dual: Floats | None) -> Outcome:
         with warnings.catch_warnings(action="ignore"):  # the status says it
-            result = self.module.solve_problem(self._problem, self._solver, initvals=z)
+            result = self.module.solve_problem(self._problem, self._solver, initvals=primal)
         if result.found:
             dual = self._form.join(array(result.y), array(result.z))
             return Outcome(array(result.x), dual, Status.SOLVED, 0)

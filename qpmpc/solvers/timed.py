@@ -20,8 +20,8 @@ EXTRA = "verification"  # the extra of qpmpc-iptm that brings these solvers
 class Outcome(NamedTuple):
     """What a backend returns of one solve."""
 
-    z: Floats
-    y: Floats
+    primal: Floats
+    dual: Floats
     status: Status
     iterations: int
 
@@ -56,7 +56,7 @@ class TimedSolver(ABC):
         self._start(structure, data)
 
     def solve(
-        self, data: QpData, z: Floats | None, y: Floats | None, cold: bool = False
+        self, data: QpData, primal: Floats | None, dual: Floats | None, cold: bool = False
     ) -> QpSolution:
         """Update the values, then solve to the tolerance; `cold` makes no difference."""
         if self._structure is None:
@@ -69,11 +69,11 @@ class TimedSolver(ABC):
         else:
             self._start(self._structure, data)
         updated = perf_counter()
-        outcome = self._run(data, z, y)
+        outcome = self._run(data, primal, dual)
         done = perf_counter()
         return QpSolution(
-            z=outcome.z,
-            y=outcome.y,
+            primal=outcome.primal,
+            dual=outcome.dual,
             status=outcome.status,
             iterations=outcome.iterations,
             solve_s=done - updated,
@@ -93,7 +93,7 @@ class TimedSolver(ABC):
         """Replace the values."""
 
     @abstractmethod
-    def _run(self, data: QpData, z: Floats | None, y: Floats | None) -> Outcome:
+    def _run(self, data: QpData, primal: Floats | None, dual: Floats | None) -> Outcome:
         """Solve what was set up last; `data` are the same once more."""
 
 

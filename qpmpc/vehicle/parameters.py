@@ -5,6 +5,7 @@ keys works as well. ``Vehicle.with_settings`` applies dotted overrides such as
 ``thermal.t_amb_degc=-15``.
 """
 
+import os
 from importlib import resources
 from itertools import pairwise
 from pathlib import Path
@@ -14,7 +15,9 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from qpmpc.errors import InputError
+from qpmpc.names import unknown
 from qpmpc.settings import apply_settings, load_toml, validated
+from qpmpc.vehicle.names import DEFAULT_VEHICLE, VEHICLES
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
@@ -204,15 +207,10 @@ class Vehicle(Section):
 
 def vehicle_names() -> tuple[str, ...]:
     """Return the names of the shipped vehicles, the default first."""
-    folder = resources.files("qpmpc.vehicle") / "data"
-    names = sorted(p.name.removesuffix(".toml") for p in folder.iterdir())
-    return tuple(sorted(names, key=lambda name: name != DEFAULT_VEHICLE))
+    return tuple(VEHICLES.shipped)
 
 
-DEFAULT_VEHICLE = "prius-nimh"
-
-
-def load_vehicle(name_or_path: str | Path = DEFAULT_VEHICLE) -> Vehicle:
+def load_vehicle(name_or_path: str | os.PathLike[str] = DEFAULT_VEHICLE) -> Vehicle:
     """Load a shipped vehicle by name, or any vehicle from a TOML file.
 
     Raises
@@ -220,15 +218,16 @@ def load_vehicle(name_or_path: str | Path = DEFAULT_VEHICLE) -> Vehicle:
     InputError
         If the name is unknown, the file cannot be read, or a key or value is not allowed.
     """
-    text = str(name_or_path)
+    text = os.fspath(name_or_path)
     if text in vehicle_names():
         source = resources.files("qpmpc.vehicle") / "data" / f"{text}.toml"
         return validated(Vehicle, load_toml(source.read_text("utf-8"), text), f"vehicle {text}")
+    if text in VEHICLES:
+        found = VEHICLES.find(text)
+        return found if isinstance(found, Vehicle) else load_vehicle(Path(found))
     path = Path(name_or_path)
     if path.suffix != ".toml":
-        raise InputError(
-            f"unknown vehicle {text!r}: use one of {', '.join(vehicle_names())}, or a .toml file"
-        )
+        raise unknown("vehicle", text, VEHICLES.names(), ", or a .toml file")
     try:
         content = path.read_text("utf-8")
     except (OSError, UnicodeDecodeError) as error:

@@ -42,7 +42,7 @@ def pair(
     trace, settings = Trace.of(cycle, vehicle), settings_of(**overrides)
     ours = generated_controller(plant, trace, settings=settings, precision=precision)
     reference = make_controller(
-        "mh-qp", plant, trace, settings=settings.with_settings({"mh_qp.solver": "osqp"})
+        "mh-qp", plant, trace, settings=settings.with_settings({"mh_qp.implementation": "python"})
     )
     assert isinstance(reference, MhQp)
     return plant, trace, ours, reference

@@ -32,7 +32,7 @@ CAR = load_vehicle()
 NYCC = load_cycle("nycc")
 TRACE = Trace.of(NYCC, CAR)
 SETTINGS = ControllerSettings()
-OSQP: dict[str, object] = {"mh_qp.solver": "osqp"}
+OSQP: dict[str, object] = {"mh_qp.implementation": "python"}
 IN_PYTHON = SETTINGS.with_settings(OSQP)
 SOLVER_FAILED, WARMING_UP = 4, 8
 

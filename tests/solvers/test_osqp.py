@@ -18,7 +18,7 @@ def recorded():
     """A planner after its departure on NYCC, with the data of its first QP."""
     plant = Plant(load_vehicle())
     truth = Trace.of(load_cycle("nycc"), plant.vehicle)
-    settings = ControllerSettings().with_settings({"mh_qp.solver": "osqp"})
+    settings = ControllerSettings().with_settings({"mh_qp.implementation": "python"})
     controller = make_controller("mh-qp", plant, truth, settings=settings)
     assert isinstance(controller, MhQp)
     controller.planner.solve(0, 0.6, 50.0)

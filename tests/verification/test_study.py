@@ -25,7 +25,7 @@ def test_rows_tell_fuel_and_violations():
     row = judge(Variant("default", "default"), [place])
     assert row["mean_percent"] == row["max_percent"] == pytest.approx(0.2, abs=0.3)
     assert row["violated"] == []
-    poor = judge(Variant("iterations K", "3", {"osqp.iterations": 3}), [place])
+    poor = judge(Variant("iterations K", "3", {"admm.iterations": 3}), [place])
     assert poor["mean_percent"] > row["mean_percent"]
     assert json.dumps([row, poor])
     assert markdown([row, poor]).count("\n") == 4

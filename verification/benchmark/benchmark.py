@@ -4,14 +4,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from qpmpc.cycles import Cycle
+from qpmpc.controllers.base import Progress
 from qpmpc.report.provenance import provenance
-from qpmpc.simulate import Progress, as_fraction
-from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.trip import Trip
 from qpmpc.verification.benchmark.candidates import RIVAL_TOLERANCE, Candidate
 from qpmpc.verification.benchmark.drive import Drive, drive
 from qpmpc.verification.benchmark.growth import growth
 from qpmpc.verification.dynamic_programming import solve_dp
+from qpmpc.verification.dynamic_programming.controller import as_fraction
 
 REPETITIONS = 3
 Job = Callable[[str], Progress]
@@ -43,28 +43,28 @@ class Benchmark:
         }
 
 
-def benchmark(
-    cycles: Sequence[Cycle], vehicle: Vehicle, chosen: Sequence[Candidate], next_job: Job
-) -> Benchmark:
-    """Let every candidate drive every cycle, one after the other in one process.
+def benchmark(trips: Sequence[Trip], chosen: Sequence[Candidate], next_job: Job) -> Benchmark:
+    """Let every candidate drive every trip, one after the other in one process.
 
     Parameters
     ----------
+    trips : all with one vehicle
     chosen : candidates
     next_job : announces a job and returns where it reports its progress; called
-        len(cycles) * (len(chosen) + 1) + 1 times
+        len(trips) * (len(chosen) + 1) + 1 times
     """
     drives, rows = [], []
-    for cycle in cycles:
-        report = next_job(f"{cycle.name}, dynamic programming")
-        solution = solve_dp(cycle, vehicle, progress=as_fraction(report))
+    for trip in trips:
+        name = trip.cycle.name
+        report = next_job(f"{name}, dynamic programming")
+        solution = solve_dp(trip.cycle, trip.vehicle, progress=as_fraction(report))
         dp_fuel_g = float(solution.fuel_g.sum())
         for candidate in chosen:
-            report = next_job(f"{cycle.name}, {candidate.label}")
-            driven = drive(candidate, cycle, vehicle, REPETITIONS, report)
+            report = next_job(f"{name}, {candidate.label}")
+            driven = drive(candidate, trip, REPETITIONS, report)
             drives.append(driven)
             rows.append(driven.row(dp_fuel_g))
     report = next_job("growth over stages")
-    grown = growth(vehicle)
+    grown = growth(trips[0].vehicle)
     report(1, 1)
     return Benchmark(drives, rows, grown)

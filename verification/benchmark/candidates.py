@@ -4,9 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 
-from qpmpc.codegen import compiler
+from qpmpc.codegen.host_library import compiler
 from qpmpc.solvers.base import QpSolver
-from qpmpc.solvers.registry import make_solver, solver_names
+from qpmpc.solvers.names import make_solver, solver_names
 
 ITERATIONS = (10, 15, 25, 35, 50, 100, 200, 400)
 RHOS = (0.01, 0.03, 0.3, 1.0)
@@ -39,10 +39,10 @@ def candidates() -> tuple[Candidate, ...]:
     """Return all candidates that can run with the packages installed here."""
     found = [_generated(k) for k in ITERATIONS] if compiler() is not None else []
     found += [
-        Candidate(f"osqp K={k}", "osqp, fixed K", {"mh_qp.osqp.iterations": k}) for k in ITERATIONS
+        Candidate(f"osqp K={k}", "osqp, fixed K", {"mh_qp.admm.iterations": k}) for k in ITERATIONS
     ]
     found += [
-        Candidate(f"osqp rho={rho:g}", "osqp, other rho", {"mh_qp.osqp.rho": rho}) for rho in RHOS
+        Candidate(f"osqp rho={rho:g}", "osqp, other rho", {"mh_qp.admm.rho": rho}) for rho in RHOS
     ]
     found += [
         Candidate(label, "osqp, other scaling", {"mh_qp.scaling.duration_exponent": exponent})
@@ -54,7 +54,7 @@ def candidates() -> tuple[Candidate, ...]:
 
 
 def _generated(k: int) -> Candidate:
-    overrides: dict[str, object] = {"mh_qp.osqp.iterations": k}
+    overrides: dict[str, object] = {"mh_qp.admm.iterations": k}
     return Candidate(f"generated K={k}", "generated C, fixed K", overrides, generated=True)
 
 

@@ -1,72 +1,23 @@
 """One candidate drives one cycle with its own answers; what it burnt and how long it took."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from qpmpc.codegen import GeneratedController, generated_controller
-from qpmpc.controllers.base import Controller, Decision, Observation
-from qpmpc.controllers.factory import ControllerSettings
-from qpmpc.controllers.mh_qp import MhQp
-from qpmpc.cycles import Cycle
-from qpmpc.preview.forecast import Trace
-from qpmpc.qp.stage_qp import QpData
-from qpmpc.qp.structure import QpStructure
+from qpmpc.closed_loop import drive as drive_trip
+from qpmpc.codegen.controller import GeneratedController
+from qpmpc.controllers.base import Progress
+from qpmpc.controllers.qp_planner import QpPlanner, Solve
+from qpmpc.controllers.receding_horizon import RecedingHorizon
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.results import Run
-from qpmpc.simulate import Progress, simulate
-from qpmpc.solvers.base import Floats, QpSolution, QpSolver
-from qpmpc.solvers.osqp import Osqp
-from qpmpc.vehicle.parameters import Vehicle
-from qpmpc.vehicle.plant import Plant
+from qpmpc.solvers.base import Floats
+from qpmpc.trip import Trip
 from qpmpc.verification.benchmark.candidates import Candidate
 
 ENOUGH_MS = 10e3  # of deciding: no further repetition then
-
-
-class Stopwatch:
-    """Passes QPs on to a backend and keeps its times, departure left out."""
-
-    def __init__(self, solver: QpSolver) -> None:
-        self.name = solver.name
-        self.solve_s: list[float] = []
-        self.update_s: list[float] = []
-        self._solver = solver
-
-    def setup(self, structure: QpStructure, data: QpData) -> None:
-        """Pass on."""
-        self._solver.setup(structure, data)
-
-    def solve(
-        self, data: QpData, z: Floats | None, y: Floats | None, cold: bool = False
-    ) -> QpSolution:
-        """Pass on, and keep the times."""
-        solution = self._solver.solve(data, z, y, cold)
-        if not cold:
-            self.solve_s.append(solution.solve_s)
-            self.update_s.append(solution.update_s)
-        return solution
-
-
-class CallWatch:
-    """Drives by a generated controller and keeps its times: the C call, and filling its input."""
-
-    def __init__(self, controller: GeneratedController) -> None:
-        self.name, self.solver_name = controller.name, controller.solver_name
-        self.solve_s: list[float] = []
-        self.update_s: list[float] = []
-        self._controller = controller
-
-    def decide(self, seen: Observation) -> Decision:
-        """Pass on, and keep the times."""
-        start = perf_counter()
-        self._controller.fill(seen)
-        filled = perf_counter()
-        decision = self._controller.step()
-        self.solve_s.append(perf_counter() - filled)
-        self.update_s.append(filled - start)
-        return decision
 
 
 @dataclass(frozen=True)
@@ -121,12 +72,11 @@ def spread(times_ms: Floats) -> dict[str, float]:
 
 def drive(
     candidate: Candidate,
-    cycle: Cycle,
-    vehicle: Vehicle,
+    trip: Trip,
     repetitions: int,
     progress: Progress | None = None,
 ) -> Drive:
-    """Let a candidate drive a cycle `repetitions` times, or fewer if that takes long.
+    """Let a candidate drive a trip `repetitions` times, or fewer if that takes long.
 
     Backends with an iteration limit of their own may need many seconds a cycle; they are driven
     in full all the same, since a benchmark of one step says nothing about a closed loop.
@@ -137,30 +87,47 @@ def drive(
     for repetition in range(repetitions):
         if sum(map(np.sum, steps)) > ENOUGH_MS:
             break
-        controller, watch, stages = _started(candidate, cycle, vehicle, settings)
+        solve_s: list[float] = []
+        update_s: list[float] = []
 
         def report(done: int, total: int, before: int = repetition) -> None:
             if progress is not None:
                 progress(before * total + done, repetitions * total)
 
-        run = simulate(cycle, controller, vehicle, progress=report)
+        if candidate.generated:
+            in_c = GeneratedController(trip, settings)
+            stages = in_c.library.values.sizes.stages
+
+            def watch(*_: object, driver: GeneratedController = in_c) -> None:
+                solve_s.append(driver.call_s)  # noqa: B023
+                update_s.append(driver.fill_s)  # noqa: B023
+
+            run = drive_trip(trip, in_c, on_step=watch, progress=report)
+        else:
+
+            def keep(solve: Solve) -> None:
+                if not solve.cold:
+                    solve_s.append(solve.solution.solve_s)  # noqa: B023
+                    update_s.append(solve.solution.update_s)  # noqa: B023
+
+            planner = _planner(candidate, trip, settings, keep)
+            stages = planner.preview.count
+            run = drive_trip(trip, RecedingHorizon(trip, planner), progress=report)
         steps.append(run.trajectory.step_time_s * 1e3)
-        solves.append(np.array(watch.solve_s) * 1e3)
-        updates.append(np.array(watch.update_s) * 1e3)
+        solves.append(np.array(solve_s) * 1e3)
+        updates.append(np.array(update_s) * 1e3)
     return Drive(candidate, run, np.array(steps), np.array(solves), np.array(updates), stages)
 
 
-def _started(
-    candidate: Candidate, cycle: Cycle, vehicle: Vehicle, settings: ControllerSettings
-) -> tuple[Controller, "Stopwatch | CallWatch", int]:
-    """Make the controller of one trip, its departure done, and what times it."""
-    plant, truth = Plant(vehicle), Trace.of(cycle, vehicle)
-    if candidate.generated:
-        made = generated_controller(plant, truth, settings=settings)
-        calls = CallWatch(made)
-        return calls, calls, made.library.values.sizes.stages
-    chosen = settings.mh_qp if candidate.controller == "mh-qp" else settings.mh_qp_paper
-    backend = Osqp(chosen.osqp) if candidate.solver is None else candidate.solver()
-    watch = Stopwatch(backend)
-    controller = MhQp(candidate.controller, plant, truth, truth, chosen, settings.rule_based, watch)
-    return controller, watch, controller.planner.preview.count
+def _planner(
+    candidate: Candidate, trip: Trip, settings: ControllerSettings, keep: Callable[[Solve], None]
+) -> QpPlanner:
+    is_ours = candidate.controller == "mh-qp"
+    return QpPlanner(
+        trip,
+        settings,
+        settings.mh_qp if is_ours else settings.mh_qp_paper,
+        name=candidate.controller,
+        solver=None if candidate.solver is None else candidate.solver(),
+        on_solve=keep,
+    )

@@ -44,14 +44,12 @@ def write_qps(recordings: Sequence[Recording], problems: Sequence[Problem], fold
 
 def recorded_npz(recording: Recording) -> bytes:
     """Return the QPs of one run, departure left out, as a compressed npz file."""
-    steps = [qp for qp in recording.qps if qp.z is not None][
-        -len(recording.run.trajectory.fuel_g) :
-    ]
+    steps = recording.on_the_road
     return _npz(
         recording.structure,
         [qp.data for qp in steps],
-        z_start=np.array([qp.z for qp in steps]),
-        y_start=np.array([qp.y for qp in steps]),
+        z_start=np.array([qp.primal for qp in steps]),
+        y_start=np.array([qp.dual for qp in steps]),
     )
 
 

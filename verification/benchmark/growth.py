@@ -5,14 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from qpmpc.controllers.mh_qp import MhQpSettings
-from qpmpc.cycles import load_cycle
-from qpmpc.preview.forecast import Trace
+from qpmpc.controllers.settings import MhQpSettings
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.stage_qp import StageQp
 from qpmpc.solvers.osqp import Osqp
+from qpmpc.trip import Trip
 from qpmpc.vehicle.parameters import Vehicle
 
 STAGES = (5, 10, 20, 50, 100, 200, 500, 1000, 2000)
@@ -29,7 +28,7 @@ def growth(vehicle: Vehicle) -> list[dict[str, Any]]:
     a row a length: stages, update_ms, solve_ms (medians, ms)
     """
     settings = MhQpSettings()
-    trace = Trace.of(load_cycle("wltc-3b"), vehicle)
+    trace = Trip("wltc-3b", vehicle).truth
     net, speed = trace.battery_side_w(vehicle), trace.speed_mps
     off = trace.internal_off_w(vehicle)
     model = PwaModel.of(vehicle, settings.pwa)
@@ -39,7 +38,7 @@ def growth(vehicle: Vehicle) -> list[dict[str, Any]]:
         stages = Stages(np.ones(count), net[at], speed[at], off[at])
         about = Linearisation.constant(count, 60.0)
         qp = StageQp(vehicle, model, count, settings.qp, settings.scaling)
-        solver = Osqp(settings.osqp)
+        solver = Osqp(settings.admm)
         solver.setup(qp.structure, qp.update(stages, 0.6, 60.0, about))
         update, solve = [], []
         for _ in range(REPETITIONS):

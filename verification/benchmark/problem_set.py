@@ -9,10 +9,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.qp.stage_qp import QpData
 from qpmpc.qp.structure import VARS, QpStructure, Var
+from qpmpc.trip import Trip
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.verification.benchmark.recorder import record
 
@@ -55,23 +56,23 @@ def problem_set(vehicle: Vehicle, settings: ControllerSettings | None = None) ->
     cold_degc = vehicle.thermal.t_cl_min_degc + COLD_MARGIN_K
     cold = vehicle.with_settings({"trip.t_cl_init_degc": cold_degc})
     problems = []
-    for trip, cycle, driver in (
-        ("city", _beginning(CITY, CITY_S), vehicle),
-        ("cold highway", _beginning(HIGHWAY, HIGHWAY_S), cold),
+    for name, trip in (
+        ("city", Trip(_beginning(CITY, CITY_S), vehicle)),
+        ("cold highway", Trip(_beginning(HIGHWAY, HIGHWAY_S), cold)),
     ):
-        recording = record(cycle, driver, settings)
-        structure, departure = recording.structure, recording.qps[0].data
-        steps = [qp.data for qp in recording.qps[-cycle.steps :]]
+        recording = record(trip, settings)
+        structure, departure = recording.structure, recording.solves[0].data
+        steps = [qp.data for qp in recording.on_the_road]
         found: list[tuple[str, Kind, QpData]] = [
             ("departure", "ordinary", departure),
             ("under way", "ordinary", steps[10]),
-            ("half way", "ordinary", steps[cycle.steps // 2]),
+            ("half way", "ordinary", steps[trip.steps // 2]),
             ("12 s left", "ordinary", steps[-12]),
             ("arrival, all but a second masked", "degenerate", steps[-1]),
-            *_degenerate(structure, steps[cycle.steps // 2]),
-            *_infeasible(structure, steps[cycle.steps // 2]),
+            *_degenerate(structure, steps[trip.steps // 2]),
+            *_infeasible(structure, steps[trip.steps // 2]),
         ]
-        problems += [Problem(f"{trip}: {name}", kind, structure, qp) for name, kind, qp in found]
+        problems += [Problem(f"{name}: {what}", kind, structure, qp) for what, kind, qp in found]
     return problems
 
 

@@ -6,16 +6,7 @@ call the function that it checks.
 
 from qpmpc.verification.checks.check import Check
 from qpmpc.verification.checks.context import Context
-from qpmpc.verification.checks.registry import GROUPS, Group, run_checks, selected
+from qpmpc.verification.checks.groups import Group, run_checks
 from qpmpc.verification.checks.report import Results, verification_html
 
-__all__ = [
-    "GROUPS",
-    "Check",
-    "Context",
-    "Group",
-    "Results",
-    "run_checks",
-    "selected",
-    "verification_html",
-]
+__all__ = ["Check", "Context", "Group", "Results", "run_checks", "verification_html"]

@@ -8,8 +8,9 @@ import numpy as np
 from qpmpc.qp.stage_qp import QpData
 from qpmpc.qp.structure import QpStructure
 from qpmpc.solvers.base import QpSolution, QpSolver, Status
-from qpmpc.solvers.osqp import Osqp, OsqpSettings
-from qpmpc.solvers.registry import make_solver, solver_names
+from qpmpc.solvers.names import make_solver, solver_names
+from qpmpc.solvers.osqp import Osqp
+from qpmpc.solvers.settings import AdmmSettings
 from qpmpc.verification.benchmark.problem_set import Problem, problem_set
 from qpmpc.verification.checks.check import Check
 from qpmpc.verification.checks.context import Context
@@ -25,7 +26,7 @@ LOOSE = {"osqp": 1e-4, "scs": 1e-5, "highs": 1e-5, "proxqp": 1e-5}
 RESIDUAL, LOOSE_RESIDUAL = 1e-5, {"osqp": 1e-3, "scs": 1e-2}  # of the largest dual
 CYCLING = ("highs",)  # see `qpmpc.solvers.highs`
 # As in a car it makes 50 iterations, from a warm start, and need not say when it is done
-TO_THE_END = OsqpSettings(cold_iterations=100_000, status_tolerance=1e-7)
+TO_THE_END = AdmmSettings(cold_iterations=100_000, status_tolerance=1e-7)
 
 
 class Solvable(NamedTuple):
@@ -40,10 +41,10 @@ def recorded_qps(context: Context) -> Iterator[Check]:
     """Backends on QPs recorded along the closed loops: KKT residuals, and the same cost."""
     for loop in context.loops:
         structure = loop.controller.planner.qp.structure
-        found = [loop.data[k] for k in samples(context, loop)[:: 3 if context.quick else 4]]
+        found = [loop.solves[k].data for k in samples(context, loop)[:: 3 if context.quick else 4]]
         qps = [Solvable(structure, data, exact(structure, data)) for data in found]
         for name in _backends(context):
-            yield from _agreement(name, loop.cycle.name, qps, "recorded")
+            yield from _agreement(name, loop.name, qps, "recorded")
 
 
 def common_problems(context: Context) -> Iterator[Check]:
@@ -83,10 +84,10 @@ def _agreement(name: str, what: str, qps: Sequence[Solvable], kinds: str) -> Ite
         if not solution.usable:
             unsolved.append(solution.status.value)
             continue
-        found = kkt_residuals(structure, data, solution.z, solution.y)
-        residual = max(residual, found.largest / (1.0 + float(np.abs(solution.y).max())))
-        cost = objective(data, best.z)
-        off = max(off, abs(objective(data, solution.z) - cost) / (1.0 + abs(cost)))
+        found = kkt_residuals(structure, data, solution.primal, solution.dual)
+        residual = max(residual, found.largest / (1.0 + float(np.abs(solution.dual).max())))
+        cost = objective(data, best.primal)
+        off = max(off, abs(objective(data, solution.primal) - cost) / (1.0 + abs(cost)))
     detail = f"{len(qps) - len(unsolved)} of {len(qps)} solved ({kinds})"
     if unsolved:
         detail += f"; others: {', '.join(sorted(set(unsolved)))}"

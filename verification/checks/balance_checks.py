@@ -4,9 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from qpmpc.closed_loop import drive
+from qpmpc.controllers.balance import rule_based
 from qpmpc.cycles import Cycle
 from qpmpc.results import Run
-from qpmpc.simulate import simulate
 from qpmpc.verification.checks.check import Check
 from qpmpc.verification.checks.context import Context
 from qpmpc.verification.independent.equations import Equations, Floats
@@ -40,9 +41,9 @@ def _imbalances(run: Run, cycle: Cycle) -> dict[str, tuple[Floats, Floats]]:
 def books_balance(context: Context) -> Iterator[Check]:
     """Every flow of every second is accounted for, with equations written independently."""
     for loop in context.loops:
-        rules = simulate(loop.cycle, "rule-based", context.vehicle, settings=context.settings)
+        rules = drive(loop.trip, rule_based(loop.trip, context.settings))
         for run in (loop.run, rules):
-            for name, (a, b) in _imbalances(run, loop.cycle).items():
+            for name, (a, b) in _imbalances(run, loop.trip.cycle).items():
                 yield Check(
                     f"Balance of {name}, {run.controller}, {run.cycle}",
                     "Both sides agree in every second, relative to the largest value of the trip.",
@@ -67,7 +68,7 @@ def limits_kept(context: Context) -> Iterator[Check]:
         }
         worst = max(excess, key=lambda name: excess[name])
         yield Check(
-            f"Limits, {loop.cycle.name}",
+            f"Limits, {loop.name}",
             "No limit of SOC, coolant, battery or engine is exceeded.",
             1e-6,
             excess[worst],
@@ -76,7 +77,7 @@ def limits_kept(context: Context) -> Iterator[Check]:
             f"{tr.t_cl_degc.max():.1f} C",
         )
         yield Check(
-            f"Final SOC, {loop.cycle.name}",
+            f"Final SOC, {loop.name}",
             "The trip ends within 1 % of its initial SOC (paper eq. 11).",
             0.01,
             abs(float(tr.soc[-1] / tr.soc[0]) - 1.0),

@@ -2,29 +2,31 @@
 
 from collections.abc import Iterator
 
-from qpmpc.controllers.factory import ControllerSettings
-from qpmpc.cycles import load_cycle
+from qpmpc.closed_loop import drive
+from qpmpc.controllers.balance import rule_based
+from qpmpc.controllers.mh_qp import mh_qp_paper
+from qpmpc.controllers.receding_horizon import RecedingHorizon
 from qpmpc.results import Run
-from qpmpc.runners import run
 from qpmpc.verification.bounds.lower_bound import LowerBound, lower_bound, stored_energy_j
 from qpmpc.verification.checks.check import Check
 from qpmpc.verification.checks.context import Context
 from qpmpc.verification.dynamic_programming import DpSettings
+from qpmpc.verification.dynamic_programming.controller import Dp
 
 BRACKET_PERCENT = 1.0
-CONTROLLERS = ("rule-based", "mh-qp-paper", "mh-qp")
 ROUNDING_G = 1e-6
 
 
 def bound_below_everything(context: Context) -> Iterator[Check]:
     """Bound <= DP <= every controller, with the width of the bracket."""
     for name in context.cycles:
-        cycle = load_cycle(name)
-        bound = lower_bound(cycle, context.vehicle)
+        trip, settings = context.trip(name), context.settings
+        bound = lower_bound(trip.cycle, context.vehicle)
         optimum = optimum_of(context, name)
         runs = [optimum, context.loop(name).run]
         if not context.quick:
-            runs += [run(cycle, c, context.vehicle) for c in CONTROLLERS if c != "mh-qp"]
+            paper = RecedingHorizon(trip, mh_qp_paper(trip, settings))
+            runs += [drive(trip, driver) for driver in (rule_based(trip, settings), paper)]
         for finished in runs:
             yield _below(bound, finished)
         yield Check(
@@ -41,8 +43,9 @@ def bound_below_everything(context: Context) -> Iterator[Check]:
 
 def optimum_of(context: Context, cycle: str) -> Run:
     """Dynamic programming on a cycle; in a quick run on its coarser grid."""
-    settings = ControllerSettings(dp=DpSettings.quick()) if context.quick else context.settings
-    return run(load_cycle(cycle), "dp", context.vehicle, settings)
+    grid = DpSettings.quick() if context.quick else DpSettings()
+    trip = context.trip(cycle)
+    return drive(trip, Dp(trip, context.settings.with_section("dp", grid)))
 
 
 def _below(bound: LowerBound, finished: Run) -> Check:

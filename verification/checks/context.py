@@ -5,35 +5,17 @@ from functools import cached_property
 
 import numpy as np
 
-from qpmpc.controllers.factory import ControllerSettings
-from qpmpc.controllers.mh_qp import MhQp, MhQpSettings
-from qpmpc.cycles import Cycle, load_cycle
-from qpmpc.preview.forecast import Trace
-from qpmpc.qp.stage_qp import QpData
+from qpmpc.controllers.mh_qp import MhQp
+from qpmpc.controllers.qp_planner import Solve
+from qpmpc.controllers.settings import ControllerSettings, MhQpSettings
 from qpmpc.results import Run
-from qpmpc.simulate import simulate
-from qpmpc.solvers.base import Floats, QpSolution, QpSolver
-from qpmpc.solvers.osqp import Osqp
-from qpmpc.vehicle import Plant, Vehicle, load_vehicle, vehicle_names
-from qpmpc.verification.benchmark.recorder import RecordingSolver
+from qpmpc.solvers.base import Floats
+from qpmpc.trip import Trip
+from qpmpc.vehicle import Vehicle, load_vehicle, vehicle_names
+from qpmpc.verification.benchmark.recorder import record
 
 QUICK_CYCLES = ("nycc",)
 FULL_CYCLES = ("nycc", "nedc-truncated")
-
-
-class _Keeper(RecordingSolver):
-    """Keeps each solution beside its QP."""
-
-    def __init__(self, solver: QpSolver) -> None:
-        super().__init__(solver)
-        self.solutions: list[QpSolution] = []
-
-    def solve(
-        self, data: QpData, z: Floats | None, y: Floats | None, cold: bool = False
-    ) -> QpSolution:
-        """Solve, and keep the answer."""
-        self.solutions.append(super().solve(data, z, y, cold))
-        return self.solutions[-1]
 
 
 @dataclass(frozen=True)
@@ -44,26 +26,29 @@ class Loop:
     ----------
     settings, controller : of `mh-qp`; the controller as it was at arrival
     run : its trajectory
-    data, starts, solutions : of the QP of each time step
+    solves : the QP of each time step, with its start and its solution
     """
 
-    cycle: Cycle
+    trip: Trip
     settings: MhQpSettings
     controller: MhQp
     run: Run
-    data: list[QpData]
-    starts: list[tuple[Floats, Floats]]
-    solutions: list[QpSolution]
+    solves: list[Solve]
+
+    @property
+    def name(self) -> str:
+        """Name of the cycle."""
+        return self.trip.cycle.name
 
     def x(self, step: int) -> Floats:
         """Solution of one step in SI units, shape (stages, variables)."""
-        scaling = self.data[step].scaling
+        solve = self.solves[step]
         stages = self.controller.planner.preview.count
-        return np.asarray(self.solutions[step].z * scaling.column).reshape(stages, -1)
+        return np.asarray(solve.solution.primal * solve.data.scaling.column).reshape(stages, -1)
 
     def sample(self, count: int) -> list[int]:
         """Steps spread evenly over the trip, the first and the last among them."""
-        return [int(k) for k in np.linspace(0, self.cycle.steps - 1, count)]
+        return [int(k) for k in np.linspace(0, self.trip.steps - 1, count)]
 
 
 class Context:
@@ -94,28 +79,19 @@ class Context:
         """All shipped vehicles."""
         return tuple(load_vehicle(name) for name in vehicle_names())
 
+    def trip(self, cycle: str) -> Trip:
+        """A shipped cycle, driven by the default vehicle."""
+        return Trip(cycle, self.vehicle)
+
     def loop(self, cycle: str) -> Loop:
         """Closed loop of `mh-qp` with all its QPs."""
         if cycle not in self._loops:
-            self._loops[cycle] = self._drive(load_cycle(cycle))
+            made = record(self.trip(cycle), self.settings)
+            trip, settings = made.controller.trip, self.settings.mh_qp
+            self._loops[cycle] = Loop(trip, settings, made.controller, made.run, made.on_the_road)
         return self._loops[cycle]
 
     @property
     def loops(self) -> list[Loop]:
         """The closed loops of all cycles."""
         return [self.loop(cycle) for cycle in self.cycles]
-
-    def _drive(self, cycle: Cycle) -> Loop:
-        mh_qp, rules = self.settings.mh_qp, self.settings.rule_based
-        plant, truth = Plant(self.vehicle), Trace.of(cycle, self.vehicle)
-        keeper = _Keeper(Osqp(mh_qp.osqp))
-        controller = MhQp("mh-qp", plant, truth, truth, mh_qp, rules, solver=keeper)
-        run = simulate(cycle, controller, self.vehicle)
-        first = len(keeper.qps) - cycle.steps  # before them, those of the preparation
-        nothing = np.empty(0)
-        starts = [
-            (nothing if qp.z is None else qp.z, nothing if qp.y is None else qp.y)
-            for qp in keeper.qps[first:]
-        ]
-        data = [qp.data for qp in keeper.qps[first:]]
-        return Loop(cycle, mh_qp, controller, run, data, starts, keeper.solutions[first:])

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from rich.console import Console
 from rich.table import Table
 
-from qpmpc.controllers.factory import ControllerSettings
-from qpmpc.cycles import load_cycle
-from qpmpc.simulate import simulate
+from qpmpc.closed_loop import drive
+from qpmpc.controllers.balance import rule_based
+from qpmpc.controllers.settings import ControllerSettings
+from qpmpc.trip import Trip
 from qpmpc.vehicle import load_vehicle
 
 M_PER_MILE = 1609.344
@@ -76,7 +77,8 @@ def model_mpg(case: EpaCase) -> float:
     """Unadjusted, SOC-balanced miles per gallon of the default car in one case."""
     vehicle = load_vehicle().with_settings(case.vehicle)
     settings = ControllerSettings().with_settings(case.rules)
-    run = simulate(load_cycle(case.cycle), "rule-based", vehicle, settings=settings)
+    trip = Trip(case.cycle, vehicle)
+    run = drive(trip, rule_based(trip, settings))
     litres = run.fuel_soc_balanced_g / 1e3 / vehicle.engine.density_kg_per_l
     return run.distance_km * 1e3 / M_PER_MILE / (litres / L_PER_GALLON)
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from qpmpc.cycles import cycle_names, load_cycle
+from qpmpc.cycles import cycle_names
 from qpmpc.verification.checks.check import Check
 from qpmpc.verification.checks.context import Context
 
@@ -25,7 +25,7 @@ def plans_beside_the_nonlinear_program(context: Context) -> Iterator[Check]:
     from qpmpc.verification.nonlinear.comparison import compare_open_loop
 
     for name in context.cycles if context.quick else cycle_names():
-        found = compare_open_loop(load_cycle(name), context.vehicle, EVERY, context.settings)
+        found = compare_open_loop(context.trip(name), EVERY, context.settings)
         states = f"{len(found.pairs)} states"
         yield Check(
             f"States without a plan of mh-nlp, {name}",
@@ -92,7 +92,7 @@ def against_the_nonlinear_program(context: Context) -> Iterator[Check]:
     from qpmpc.verification.nonlinear.comparison import compare_closed_loop
 
     for name in cycle_names():
-        both = compare_closed_loop(load_cycle(name), context.vehicle, context.settings)
+        both = compare_closed_loop(context.trip(name), context.settings)
         qp, nlp = both.qp, both.nlp
         yield Check(
             f"Fuel beside mh-nlp, {name}",

@@ -4,14 +4,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from qpmpc.controllers.factory import ControllerSettings
-from qpmpc.cycles import load_cycle
+from qpmpc.closed_loop import drive
+from qpmpc.codegen.implementation import mh_qp
+from qpmpc.controllers.balance import rule_based
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.preview import Stages
 from qpmpc.pwa import PwaModel
 from qpmpc.qp import Linearisation, QpSettings, ScalingSettings, StageQp
 from qpmpc.qp.coolant import coolant_step
-from qpmpc.simulate import simulate
-from qpmpc.solvers.registry import make_solver
+from qpmpc.solvers.names import make_solver
+from qpmpc.trip import Trip
 from qpmpc.vehicle import Vehicle
 from qpmpc.verification.checks.check import Check
 from qpmpc.verification.checks.context import Context
@@ -30,10 +32,11 @@ NO_HEAT: dict[str, object] = {
 NO_HOT_LIMIT: dict[str, object] = {"thermal.heat_capacity_j_per_k": 1e9}
 
 
-def _fuel_g(
-    vehicle: Vehicle, name: str = "mh-qp", rules: ControllerSettings | None = None
-) -> float:
-    return simulate(load_cycle(CYCLE), name, vehicle, settings=rules).fuel_soc_balanced_g
+def _fuel_g(vehicle: Vehicle, rules: ControllerSettings | None = None) -> float:
+    """SOC-balanced fuel of `mh-qp`; of the rules where their settings are given."""
+    trip = Trip(CYCLE, vehicle)
+    driver = mh_qp(trip) if rules is None else rule_based(trip, rules)
+    return drive(trip, driver).fuel_soc_balanced_g
 
 
 def monotone(context: Context) -> Iterator[Check]:
@@ -122,7 +125,7 @@ def constant_demand(context: Context) -> Iterator[Check]:
         data = qp.update(stages, vehicle.trip.soc_init, 50.0, about)
         solver = make_solver("piqp", 1e-9)
         solver.setup(qp.structure, data)
-        z = solver.solve(data, None, None, cold=True).z
+        z = solver.solve(data, None, None, cold=True).primal
         rate = float(data.q @ z) / data.scaling.cost / duration
         p = np.arange(net_w, vehicle.engine.power_max_w, 1.0)
         p = p[p <= net_w + vehicle.battery.power_charge_max_w]
@@ -168,9 +171,9 @@ def engine_covers_demand(context: Context) -> Iterator[Check]:
 def dimensions(context: Context) -> Iterator[Check]:
     """Units and sizes: double the heating value, or the whole car."""
     vehicle = context.vehicle
-    base = _fuel_g(vehicle, "rule-based")
+    base = _fuel_g(vehicle, ControllerSettings())
     lhv = 2.0 * vehicle.engine.lhv_j_per_kg
-    half = _fuel_g(vehicle.with_settings({"engine.lhv_j_per_kg": lhv}), "rule-based")
+    half = _fuel_g(vehicle.with_settings({"engine.lhv_j_per_kg": lhv}), ControllerSettings())
     yield Check(
         "Double heating value",
         "Fuel of twice the heating value is burnt in exactly half the mass.",
@@ -180,7 +183,7 @@ def dimensions(context: Context) -> Iterator[Check]:
         f"rule-based on {CYCLE}: {base:.4f} and {half:.4f} g",
     )
     larger, rules = _twice(vehicle)
-    double = _fuel_g(larger, "rule-based", rules)
+    double = _fuel_g(larger, rules)
     yield Check(
         "Car of twice the size",
         "With every mass, force, power, capacity and conductance doubled, fuel doubles.",

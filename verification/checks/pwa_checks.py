@@ -97,7 +97,7 @@ def trip_error_small(context: Context) -> Iterator[Check]:
     for loop in context.loops:
         fuel_g, soc = trip_error(loop, model, context.vehicle)
         yield Check(
-            f"PWA error of a trip, fuel, {loop.cycle.name}",
+            f"PWA error of a trip, fuel, {loop.name}",
             "The PWA errors of fuel and cold multiplier, all of one sign, cost less than this.",
             100.0 * TRIP_SHARE,
             100.0 * fuel_g / loop.run.fuel_g,
@@ -105,7 +105,7 @@ def trip_error_small(context: Context) -> Iterator[Check]:
             f"{fuel_g:.3f} g of {loop.run.fuel_g:.2f} g: sum of alpha e_f + e_alpha f",
         )
         yield Check(
-            f"PWA error of a trip, SOC, {loop.cycle.name}",
+            f"PWA error of a trip, SOC, {loop.name}",
             "The PWA errors of the battery, all of one sign, move SOC by less than this.",
             TRIP_SOC,
             soc,

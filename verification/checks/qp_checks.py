@@ -4,13 +4,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from qpmpc.preview import HorizonSettings, StageBuilder, Trace
+from qpmpc.preview import HorizonSettings, StageBuilder
 from qpmpc.pwa import PwaModel
 from qpmpc.qp import Linearisation, QpSettings, ScalingSettings, StageQp
 from qpmpc.qp.stage_qp import QpData
 from qpmpc.qp.structure import QpStructure
 from qpmpc.solvers.base import Floats, QpSolution
-from qpmpc.solvers.registry import make_solver
+from qpmpc.solvers.names import make_solver
 from qpmpc.verification.checks.check import Check
 from qpmpc.verification.checks.context import Context, Loop
 from qpmpc.verification.independent.stage_program import (
@@ -41,7 +41,7 @@ def stages_agree(context: Context) -> Iterator[Check]:
         worst = 0.0
         for step in samples(context, loop):
             ours = loop.controller.planner.preview.at(step)
-            theirs = horizon(loop.cycle, loop.run.vehicle, loop.settings, step)
+            theirs = horizon(loop.trip.cycle, loop.run.vehicle, loop.settings, step)
             pairs = (
                 (ours.duration_s, theirs.h),
                 (ours.net_w, theirs.net_w),
@@ -51,7 +51,7 @@ def stages_agree(context: Context) -> Iterator[Check]:
             for a, b in pairs:
                 worst = max(worst, float(np.max(np.abs(a - b)) / max(np.abs(b).max(), 1.0)))
         yield Check(
-            f"Stages of the horizon, {loop.cycle.name}",
+            f"Stages of the horizon, {loop.name}",
             "Durations, P0, speeds and l(P0) are the means over the seconds that they stand for.",
             1e-9,
             worst,
@@ -63,7 +63,7 @@ def _program(loop: Loop, curves: Curves, step: int) -> StageProgram:
     tr, vehicle = loop.run.trajectory, loop.run.vehicle
     state = (float(tr.soc[step]), float(tr.t_cl_degc[step]))
     about = expansion(loop.x(step - 1), loop.settings, state[1])
-    road = horizon(loop.cycle, vehicle, loop.settings, step)
+    road = horizon(loop.trip.cycle, vehicle, loop.settings, step)
     return stage_program(vehicle, curves, loop.settings, road, state, about)
 
 
@@ -76,9 +76,9 @@ def same_optimum(context: Context) -> Iterator[Check]:
         cost_error, violation, where, entries = 0.0, 0.0, "", 0.0
         gap = 0.0
         for step in samples(context, loop):
-            program, data = _program(loop, curves, step), loop.data[step]
+            program, data = _program(loop, curves, step), loop.solves[step].data
             solution = exact(qp.structure, data)
-            x = data.scaling.primal(solution.z)
+            x = data.scaling.primal(solution.primal)
             least, ours = program.least(), float(program.cost @ x)
             cost_error = max(cost_error, _relative(ours, least, program, x))
             off, row = program.violation(x)
@@ -88,7 +88,7 @@ def same_optimum(context: Context) -> Iterator[Check]:
             size = float(np.abs(program.cost).max())
             entries = max(entries, float(np.abs(linear - program.cost).max()) / size)
             gap = max(gap, _duality_gap(data, solution))
-        name = loop.cycle.name
+        name = loop.name
         yield Check(
             f"Optimum of the QP, {name}",
             "The QP of a step and the linear program from the equations cost the same.",
@@ -138,7 +138,7 @@ def _relative(ours: float, least: float, program: StageProgram, x: Floats) -> fl
 def _duality_gap(data: QpData, solution: QpSolution) -> float:
     """|c x + x P x + y_up u - y_low l| relative, all in g and SI units."""
     scale = data.scaling
-    x, dual = scale.primal(solution.z), scale.dual(solution.y)
+    x, dual = scale.primal(solution.primal), scale.dual(solution.dual)
     cost = data.q / scale.column / scale.cost
     curvature = data.hessian / scale.column**2 / scale.cost
     above, below = np.maximum(dual, 0.0), np.maximum(-dual, 0.0)
@@ -153,18 +153,20 @@ def warm_start_shifted(context: Context) -> Iterator[Check]:
     for loop in context.loops:
         worst = 0.0
         for step in samples(context, loop):
-            scale, last = loop.data[step].scaling, loop.data[step - 1].scaling
+            scale, last = loop.solves[step].data.scaling, loop.solves[step - 1].data.scaling
             n = loop.controller.planner.preview.count
-            z, y = loop.starts[step]
-            duals = (loop.solutions[step - 1].y * last.row / last.cost).reshape(n, -1)
+            start = loop.solves[step]
+            if start.primal is None or start.dual is None:
+                raise RuntimeError(f"step {step} has no warm start")
+            duals = (loop.solves[step - 1].solution.dual * last.row / last.cost).reshape(n, -1)
             pairs = (
-                (z * scale.column, shifted(loop.x(step - 1), loop.settings).ravel()),
-                (y * scale.row / scale.cost, shifted(duals, loop.settings).ravel()),
+                (start.primal * scale.column, shifted(loop.x(step - 1), loop.settings).ravel()),
+                (start.dual * scale.row / scale.cost, shifted(duals, loop.settings).ravel()),
             )
             for a, b in pairs:
                 worst = max(worst, float(np.abs(a - b).max() / np.abs(b).max()))
         yield Check(
-            f"Warm start, {loop.cycle.name}",
+            f"Warm start, {loop.name}",
             "Primal and dual start are the last step's, carried over by identity, in SI units.",
             1e-9,
             worst,
@@ -177,7 +179,7 @@ def scaling_is_neutral(context: Context) -> Iterator[Check]:
     vehicle = context.vehicle
     loop = context.loop("nycc")
     model = PwaModel.of(vehicle)
-    truth = Trace.of(loop.cycle, vehicle)
+    truth = loop.trip.truth
     preview = StageBuilder(vehicle, truth, truth, HorizonSettings())
     about = Linearisation.constant(preview.count, 48.0)
     fuels = []
@@ -189,7 +191,7 @@ def scaling_is_neutral(context: Context) -> Iterator[Check]:
     for unit in units:
         qp = StageQp(vehicle, model, preview.count, QpSettings(regularisation=1e-9), unit)
         data = qp.update(preview.at(100), 0.6, 50.0, about)
-        x = data.scaling.primal(exact(qp.structure, data).z)
+        x = data.scaling.primal(exact(qp.structure, data).primal)
         fuels.append(float((data.q / data.scaling.column / data.scaling.cost) @ x))
     yield Check(
         "Units of the solver",

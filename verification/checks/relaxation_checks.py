@@ -17,19 +17,19 @@ def relaxation_tight(context: Context) -> Iterator[Check]:
     """Gap of the relaxed inequalities and integrality of the on-share, as applied."""
     for loop in context.loops:
         tr = loop.run.trajectory
-        gap, sigma = tr.relaxation_gap, tr.sigma
+        gap, sigma = tr.relaxation_gap, tr.on_share
         yield Check(
-            f"Relaxation gap, {loop.cycle.name}",
+            f"Relaxation gap, {loop.name}",
             "Fuel and battery inequalities are tight at the applied stage, in the mean.",
             100.0 * GAP_MEAN,
             100.0 * float(np.mean(gap)),
             "%",
-            f"largest {100.0 * float(gap.max()):.2f} %, at {context.settings.mh_qp.osqp.iterations}"
+            f"largest {100.0 * float(gap.max()):.2f} %, at {context.settings.mh_qp.admm.iterations}"
             " iterations a step",
         )
         integral = float(np.mean((sigma < INTEGRAL) | (sigma > 1.0 - INTEGRAL)))
         yield Check(
-            f"Integral on-share, {loop.cycle.name}",
+            f"Integral on-share, {loop.name}",
             f"The on-share of the applied stage is within {INTEGRAL:g} of 0 or 1.",
             100.0 * INTEGRAL_SHARE,
             100.0 * integral,
@@ -63,11 +63,11 @@ def expansion_error(loop: Loop, step: int) -> tuple[float, float]:
 def expansion_small(context: Context) -> Iterator[Check]:
     """One linearisation a step is enough: the expansion is exact to second order."""
     for loop in context.loops:
-        errors = [expansion_error(loop, k) for k in range(1, loop.cycle.steps)]
+        errors = [expansion_error(loop, k) for k in range(1, loop.trip.steps)]
         burning = [(error, fuel) for error, fuel in errors if fuel > 1.0]
         shares = [100.0 * error / fuel for error, fuel in burning]
         yield Check(
-            f"Expansion of alpha(T) F, {loop.cycle.name}",
+            f"Expansion of alpha(T) F, {loop.name}",
             "Expanding alpha(T) F about the last plan misses the plan's fuel by less, in the mean.",
             100.0 * EXPANSION_SHARE,
             float(np.mean(shares)),

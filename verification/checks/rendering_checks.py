@@ -5,12 +5,9 @@ from math import nan
 
 import numpy as np
 
-from qpmpc.codegen import generated_controller
+from qpmpc.codegen.controller import GeneratedController
 from qpmpc.codegen.host_library import compiler
-from qpmpc.controllers.base import Observation
-from qpmpc.cycles import load_cycle
-from qpmpc.preview import Trace
-from qpmpc.vehicle import Plant
+from qpmpc.vehicle import PlantState
 from qpmpc.verification.checks.check import Check
 from qpmpc.verification.checks.context import Context, Loop
 
@@ -35,8 +32,7 @@ def one_qp(context: Context) -> Iterator[Check]:
 
     every, random = (QUICK_EVERY, QUICK_RANDOM) if context.quick else (FULL_EVERY, FULL_RANDOM)
     for name in context.cycles:
-        cycle = load_cycle(name)
-        found = check_equivalence(cycle, context.vehicle, every, random, SEED, context.settings)
+        found = check_equivalence(context.trip(name), every, random, SEED, context.settings)
         worst = found.worst()
         cases = f"{len(found.cases) - random} recorded and {random} random cases"
         for key, what in NAMES.items():
@@ -59,27 +55,25 @@ def one_qp(context: Context) -> Iterator[Check]:
 def generated_c(context: Context) -> Iterator[Check]:
     """The generated C of this machine, in double precision, along the closed loops."""
     for loop in context.loops:
-        title = f"Generated C, {loop.cycle.name}"
+        title = f"Generated C, {loop.name}"
         if compiler() is None:
             yield Check(title, CLAIM, F64_W, nan, "W", NO_COMPILER, skipped=True)
             continue
         worst, flips = _compare(loop, context)
         yield Check(
             title, CLAIM, F64_W, worst, "W", f"engine state differs in {flips} of "
-            f"{loop.cycle.steps} steps"
+            f"{loop.trip.steps} steps"
         )  # fmt: skip
 
 
 def _compare(loop: Loop, context: Context) -> tuple[float, int]:
     """Largest difference of the engine power applied, W, and steps with another engine state."""
-    tr, vehicle = loop.run.trajectory, loop.run.vehicle
-    plant, truth = Plant(vehicle), Trace.of(loop.cycle, vehicle)
-    controller = generated_controller(plant, truth, settings=context.settings, precision="f64")
+    tr = loop.run.trajectory
+    controller = GeneratedController(loop.trip, context.settings)
     worst, flips, was_on = 0.0, 0, False
-    for k in range(loop.cycle.steps):
-        soc, t_cl_degc = float(tr.soc[k]), float(tr.t_cl_degc[k])
-        demand, speed = float(tr.demand_w[k]), float(tr.speed_mps[k])
-        command = controller.decide(Observation(k, soc, t_cl_degc, was_on, demand, speed)).command
+    for k in range(loop.trip.steps):
+        state = PlantState(float(tr.soc[k]), float(tr.t_cl_degc[k]), was_on)
+        command = controller.decide(loop.trip.observation(k, state)).command
         flips += command.engine_on != bool(tr.engine_on[k])
         worst = max(worst, abs(command.p_eng_w - float(tr.p_eng_w[k])))
         was_on = bool(tr.engine_on[k])

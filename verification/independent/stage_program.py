@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from qpmpc.controllers.mh_qp import MhQpSettings
+from qpmpc.controllers.settings import MhQpSettings
 from qpmpc.cycles import Cycle
 from qpmpc.pwa.fit import PwaFit
 from qpmpc.vehicle.parameters import Vehicle

@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpmpc.controllers.base import Decision, Observation
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.closed_loop import drive
+from qpmpc.codegen.implementation import mh_qp
+from qpmpc.controllers.base import Decision
 from qpmpc.controllers.mh_qp import MhQp
-from qpmpc.controllers.planner import Plan
-from qpmpc.cycles import Cycle
-from qpmpc.preview.forecast import Trace
+from qpmpc.controllers.qp_planner import QpPlan
+from qpmpc.controllers.receding_horizon import RecedingHorizon
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.qp.structure import Var
-from qpmpc.simulate import simulate
+from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.engine import OptimalLine, alpha
 from qpmpc.vehicle.parameters import Vehicle
-from qpmpc.vehicle.plant import Plant
-from qpmpc.verification.nonlinear.mh_nlp import MhNlp, make_mh_nlp
+from qpmpc.verification.nonlinear.mh_nlp import MhNlp
 from qpmpc.verification.nonlinear.problem import NlpVar
 from qpmpc.verification.nonlinear.solver import NlpPlan
 
@@ -111,58 +111,39 @@ class NlpComparison:
         }
 
 
-class _Paired:
-    """Drives with `mh-qp` and, every few steps, plans with the nonlinear program as well."""
+def _pair(vehicle: Vehicle, seen: Observation, qp: QpPlan, nlp: NlpPlan) -> PlanPair:
+    h = qp.stages.duration_s
+    soc = np.abs(qp.x[:, Var.SOC] - nlp.x[:, NlpVar.SOC])
+    t_cl = np.abs(qp.x[:, Var.T_CL] - nlp.x[:, NlpVar.T_CL])
+    sigma = nlp.x[:, NlpVar.ON]
+    power = np.array([nlp.power_on_w(stage) for stage in range(len(h))])
+    nlp_rate = sigma * OptimalLine(vehicle.engine).fuel(power)
+    counts = h > 0.0
+    burning = np.flatnonzero(counts & (sigma > ON_LEAST))
+    warmed = slice(0, 1 + (int(burning[-1]) if burning.size else 0))
+    return PlanPair(
+        step=seen.step,
+        qp_on_share=float(qp.x[0, Var.ON]),
+        nlp_on_share=float(sigma[0]),
+        qp_power_w=float(qp.x[0, Var.P_ENG]),
+        nlp_power_w=float(sigma[0] * power[0]),
+        soc_difference=float(soc[counts].max()),
+        t_cl_difference_k=float(t_cl[warmed].max()),
+        qp_fuel_g=_fuel_g(vehicle, h, qp.x[:, Var.T_CL], qp.x[:, Var.FUEL], seen.t_cl_degc),
+        nlp_fuel_g=_fuel_g(vehicle, h, nlp.x[:, NlpVar.T_CL], nlp_rate, seen.t_cl_degc),
+    )
 
-    name, solver_name = "mh-qp", "osqp"
 
-    def __init__(self, qp: MhQp, nlp: MhNlp, plant: Plant, every: int) -> None:
-        self.pairs: list[PlanPair] = []
-        self.unsolved = 0
-        self._qp, self._nlp, self._every = qp, nlp, every
-        self._line, self._vehicle = OptimalLine(plant.vehicle.engine), plant.vehicle
-
-    def decide(self, seen: Observation) -> Decision:
-        decision = self._qp.decide(seen)
-        qp = self._qp.planner.plan
-        if seen.step % self._every == 0 and qp is not None and not decision.fallback:
-            nlp = self._nlp.plan(seen.step, seen.soc, seen.t_cl_degc)
-            if nlp.solved:
-                self.pairs.append(self._pair(seen, qp, nlp))
-            else:
-                self.unsolved += 1
-        return decision
-
-    def _pair(self, seen: Observation, qp: Plan, nlp: NlpPlan) -> PlanPair:
-        h = qp.stages.duration_s
-        soc = np.abs(qp.x[:, Var.SOC] - nlp.x[:, NlpVar.SOC])
-        t_cl = np.abs(qp.x[:, Var.T_CL] - nlp.x[:, NlpVar.T_CL])
-        sigma = nlp.x[:, NlpVar.ON]
-        power = np.array([nlp.power_on_w(stage) for stage in range(len(h))])
-        nlp_rate = sigma * self._line.fuel(power)
-        counts = h > 0.0
-        burning = np.flatnonzero(counts & (sigma > ON_LEAST))
-        warmed = slice(0, 1 + (int(burning[-1]) if burning.size else 0))
-        return PlanPair(
-            step=seen.step,
-            qp_on_share=float(qp.x[0, Var.ON]),
-            nlp_on_share=float(sigma[0]),
-            qp_power_w=float(qp.x[0, Var.P_ENG]),
-            nlp_power_w=float(sigma[0] * power[0]),
-            soc_difference=float(soc[counts].max()),
-            t_cl_difference_k=float(t_cl[warmed].max()),
-            qp_fuel_g=self._fuel_g(h, qp.x[:, Var.T_CL], qp.x[:, Var.FUEL], seen.t_cl_degc),
-            nlp_fuel_g=self._fuel_g(h, nlp.x[:, NlpVar.T_CL], nlp_rate, seen.t_cl_degc),
-        )
-
-    def _fuel_g(self, h: Floats, t_cl_degc: Floats, hot_g_per_s: Floats, now_degc: float) -> float:
-        """Planned fuel, sum h alpha(T) F with T the mean over the stage."""
-        mean = 0.5 * (t_cl_degc + np.concatenate([[now_degc], t_cl_degc[:-1]]))
-        return float(np.sum(h * alpha(self._vehicle.cold_engine, mean) * hot_g_per_s))
+def _fuel_g(
+    vehicle: Vehicle, h: Floats, t_cl_degc: Floats, hot_g_per_s: Floats, now_degc: float
+) -> float:
+    """Planned fuel, sum h alpha(T) F with T the mean over the stage."""
+    mean = 0.5 * (t_cl_degc + np.concatenate([[now_degc], t_cl_degc[:-1]]))
+    return float(np.sum(h * alpha(vehicle.cold_engine, mean) * hot_g_per_s))
 
 
 def compare_open_loop(
-    cycle: Cycle, vehicle: Vehicle, every: int = 5, settings: ControllerSettings | None = None
+    trip: Trip, every: int = 5, settings: ControllerSettings | None = None
 ) -> OpenLoopComparison:
     """Plan with both programs at every `every`-th state of the closed loop of `mh-qp`.
 
@@ -171,31 +152,41 @@ def compare_open_loop(
     QpmpcError
         If CasADi is not installed.
     """
-    chosen = settings or ControllerSettings()
-    plant, truth = Plant(vehicle), Trace.of(cycle, vehicle)
-    qp = MhQp("mh-qp", plant, truth, truth, chosen.mh_qp, chosen.rule_based)
-    paired = _Paired(qp, make_mh_nlp(plant, truth, truth, chosen), plant, every)
-    simulate(cycle, paired, vehicle)
-    return OpenLoopComparison(cycle.name, paired.pairs, paired.unsolved)
+    driver, nlp = MhQp(trip, settings), MhNlp(trip, settings)
+    nlp.depart(trip.start)
+    pairs: list[PlanPair] = []
+    unsolved = 0
+
+    def plan_too(seen: Observation, decision: Decision) -> None:
+        nonlocal unsolved
+        qp = driver.planner.last
+        if seen.step % every == 0 and qp is not None and not decision.fallback:
+            beside = nlp.solve(seen)
+            if beside.solved:
+                pairs.append(_pair(trip.vehicle, seen, qp, beside))
+            else:
+                unsolved += 1
+
+    drive(trip, driver, on_step=plan_too)
+    return OpenLoopComparison(trip.cycle.name, pairs, unsolved)
 
 
 def compare_closed_loop(
-    cycle: Cycle, vehicle: Vehicle, settings: ControllerSettings | None = None
+    trip: Trip, settings: ControllerSettings | None = None
 ) -> ClosedLoopComparison:
-    """Drive a cycle with both controllers.
+    """Drive a trip with both controllers.
 
     Raises
     ------
     QpmpcError
         If CasADi is not installed.
     """
-    chosen = settings or ControllerSettings()
-    nlp_controller = make_mh_nlp(Plant(vehicle), Trace.of(cycle, vehicle), None, chosen)
-    qp = simulate(cycle, "mh-qp", vehicle, settings=chosen).summary()
-    nlp = simulate(cycle, nlp_controller, vehicle).summary()
+    nlp_controller = RecedingHorizon(trip, MhNlp(trip, settings))
+    qp = drive(trip, mh_qp(trip, settings)).summary()
+    nlp = drive(trip, nlp_controller).summary()
     fuel = "fuel_soc_balanced_g"
     return ClosedLoopComparison(
-        cycle=cycle.name,
+        cycle=trip.cycle.name,
         qp=qp,
         nlp=nlp,
         fuel_difference_percent=100.0 * (qp[fuel] / nlp[fuel] - 1.0),
@@ -205,12 +196,12 @@ def compare_closed_loop(
     )
 
 
-def compare(cycles: Iterable[Cycle], vehicle: Vehicle, every: int = 5) -> NlpComparison:
-    """Compare open and closed loop on several cycles; see `compare_open_loop`."""
-    listed = list(cycles)
+def compare(trips: Iterable[Trip], every: int = 5) -> NlpComparison:
+    """Compare open and closed loop on several trips; see `compare_open_loop`."""
+    listed = list(trips)
     return NlpComparison(
-        [compare_open_loop(cycle, vehicle, every) for cycle in listed],
-        [compare_closed_loop(cycle, vehicle) for cycle in listed],
+        [compare_open_loop(trip, every) for trip in listed],
+        [compare_closed_loop(trip) for trip in listed],
     )
 
 

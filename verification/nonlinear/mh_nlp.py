@@ -6,16 +6,12 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from qpmpc.controllers.base import Decision, Observation
-from qpmpc.controllers.factory import ControllerSettings
-from qpmpc.controllers.mh_qp import ON_THRESHOLD, PLAN_VALID_STEPS
-from qpmpc.controllers.rule_based import RuleBased, RuleBasedSettings
-from qpmpc.controllers.safety import SafetyLayer
-from qpmpc.preview.forecast import Trace
+from qpmpc.controllers.receding_horizon import ON_THRESHOLD, Plan, Planner
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.preview.stages import StageBuilder
 from qpmpc.qp.stage_qp import QpSettings
-from qpmpc.vehicle.plant import Command, Plant
+from qpmpc.trip import Observation, Trip
 from qpmpc.verification.nonlinear.problem import NlpProblem, NlpVar
 from qpmpc.verification.nonlinear.solver import NlpPlan, NlpSolver
 
@@ -41,15 +37,13 @@ class MhNlpSettings(BaseModel):
     on_off_prices_g: tuple[Annotated[float, Field(gt=0.0)], ...] = (0.1, 1.0, 10.0)
 
 
-class MhNlp:
+class MhNlp(Planner):
     """Multi-horizon MPC as a nonlinear program, solved to the end by IPOPT at every step.
 
     Parameters
     ----------
-    plant : vehicle and its maps; its step is never called
-    truth, forecast : what the short and the long horizon see
-    settings : horizon, limits, treatment of on/off
-    rules : thresholds of the last rung of the ladder
+    trip, settings : as of `Planner`
+    of_nlp : horizon, limits, treatment of on/off; those of `mh_qp` if None
 
     Raises
     ------
@@ -62,63 +56,65 @@ class MhNlp:
 
     def __init__(
         self,
-        plant: Plant,
-        truth: Trace,
-        forecast: Trace,
-        settings: MhNlpSettings,
-        rules: RuleBasedSettings,
+        trip: Trip,
+        settings: ControllerSettings | None = None,
+        of_nlp: MhNlpSettings | None = None,
     ) -> None:
-        self.settings = settings
-        vehicle = plant.vehicle
-        self.preview = StageBuilder(vehicle, truth, forecast, settings.horizon)
-        short = settings.horizon.short_stages
-        self.solver = NlpSolver(NlpProblem(vehicle, self.preview.count, short, settings.qp))
+        super().__init__(trip, settings)
+        of_qp = self.settings.mh_qp
+        self.of_nlp = of_nlp or MhNlpSettings(horizon=of_qp.horizon, qp=of_qp.qp)
+        horizon, vehicle = self.of_nlp.horizon, trip.vehicle
+        self.preview = StageBuilder(vehicle, trip.truth, trip.forecast, horizon)
+        count, short = self.preview.count, horizon.short_stages
+        self.solver = NlpSolver(NlpProblem(vehicle, count, short, self.of_nlp.qp))
         self._shift = self.preview.shift()
-        self._safety = SafetyLayer(plant, rules.heat_power_w)
-        self._rules = RuleBased(plant, rules)
-        self._plan: NlpPlan | None = None
-        self._plan_step = 0
-        trip = vehicle.trip
-        self.plan(0, trip.soc_init, trip.t_cl_init_degc)
+        self._last: NlpPlan | None = None
+        self._last_step = 0
 
-    def decide(self, seen: Observation) -> Decision:
-        """Run one step: NLP, else the shifted last plan, else the rules; safety layer always."""
-        ruled = self._rules.decide(seen)
-        plan = self.plan(seen.step, seen.soc, seen.t_cl_degc)
-        if plan.solved:
-            command = self._safety.admissible(_realise(plan, 0), seen)
-            return Decision(command, "", plan.iterations, sigma=float(plan.z[0, NlpVar.ON]))
-        age = seen.step - self._plan_step
-        short = self.settings.horizon.short_stages
-        if self._plan is not None and age < min(PLAN_VALID_STEPS + 1, short):
-            command = self._safety.admissible(_realise(self._plan, age), seen)
-            return Decision(command, "shifted plan", plan.iterations)
-        return Decision(ruled.command, "rule-based", plan.iterations)
+    def depart(self, seen: Observation) -> None:
+        """Solve the program of departure."""
+        self.forget()
+        self.solve(seen)
 
-    def plan(self, step: int, soc: float, t_cl_degc: float) -> NlpPlan:
-        """Solve the program of time step `step`, warm from the last plan if there is one.
+    def plan(self, seen: Observation) -> Plan:
+        """Plan with the solution of this second's program."""
+        solved = self.solve(seen)
+        if not solved.solved:
+            return Plan.none(solved.iterations)
+        on_share = solved.z[: self.of_nlp.horizon.short_stages, NlpVar.ON]
+        powers_w = np.zeros_like(on_share)
+        for stage in np.flatnonzero(on_share >= ON_THRESHOLD).tolist():
+            powers_w[stage] = solved.power_on_w(stage)
+        return Plan(on_share, powers_w, True, solved.iterations)
+
+    def forget(self) -> None:
+        """Forget the last solution, as after a restart of the controller on the road."""
+        self._last = None
+
+    def solve(self, seen: Observation) -> NlpPlan:
+        """Solve the program of this second, warm from the last plan if there is one.
 
         Where the warm start fails, the step is solved again from nothing.
         """
-        stages = self.preview.at(step)
-        start = self._plan
+        stages = self.preview.at(seen.step)
+        start = self._last
         if start is not None:
-            for _ in range(step - self._plan_step):
+            for _ in range(seen.step - self._last_step):
                 start = start.shifted(self._shift)
-        plan = self.solver.solve(stages, soc, t_cl_degc, start)
+        plan = self.solver.solve(stages, seen.soc, seen.t_cl_degc, start)
         if not plan.solved and start is not None:
-            again = self.solver.solve(stages, soc, t_cl_degc)
+            again = self.solver.solve(stages, seen.soc, seen.t_cl_degc)
             plan = replace(again, iterations=again.iterations + plan.iterations)
         if plan.solved:
-            self._plan, self._plan_step = plan, step
-            if self.settings.on_off == "homotopy":
-                return self._integral(plan, soc, t_cl_degc)
+            self._last, self._last_step = plan, seen.step
+            if self.of_nlp.on_off == "homotopy":
+                return self._integral(plan, seen.soc, seen.t_cl_degc)
         return plan
 
     def _integral(self, plan: NlpPlan, soc: float, t_cl_degc: float) -> NlpPlan:
         """Drive the on-share of the short stages to 0 or 1, as far as IPOPT gets."""
-        short = self.settings.horizon.short_stages
-        for price in self.settings.on_off_prices_g:
+        short = self.of_nlp.horizon.short_stages
+        for price in self.of_nlp.on_off_prices_g:
             sigma = plan.z[:short, NlpVar.ON]
             if np.all(np.minimum(sigma, 1.0 - sigma) < INTEGRAL):
                 break
@@ -127,35 +123,3 @@ class MhNlp:
                 break
             plan = replace(dearer, iterations=dearer.iterations + plan.iterations)
         return plan
-
-
-def _realise(plan: NlpPlan, stage: int) -> Command:
-    """On/off from the on-share as in `mh-qp`, at the power planned for the engine when on."""
-    if plan.z[stage, NlpVar.ON] < ON_THRESHOLD:
-        return Command(False, 0.0)
-    return Command(True, plan.power_on_w(stage))
-
-
-def make_mh_nlp(
-    plant: Plant,
-    truth: Trace,
-    forecast: Trace | None = None,
-    settings: ControllerSettings | None = None,
-) -> MhNlp:
-    """Make the nonlinear reference with the horizon, limits and rules of `mh-qp`.
-
-    Parameters
-    ----------
-    plant : vehicle and its maps
-    truth : what the short horizon sees
-    forecast : what the long horizon sees; the truth if None
-    settings : of all controllers; those of `mh_qp` and `rule_based` count
-
-    Raises
-    ------
-    QpmpcError
-        If CasADi is not installed.
-    """
-    chosen = settings or ControllerSettings()
-    nlp = MhNlpSettings(horizon=chosen.mh_qp.horizon, qp=chosen.mh_qp.qp)
-    return MhNlp(plant, truth, forecast or truth, nlp, chosen.rule_based)

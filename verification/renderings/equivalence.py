@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 from qpmpc.codegen.controller import InputBuilder
 from qpmpc.codegen.host_library import compiler
 from qpmpc.codegen.values import values_of
-from qpmpc.controllers.factory import ControllerSettings
-from qpmpc.cycles import Cycle
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.errors import QpmpcError
-from qpmpc.preview.forecast import Trace
 from qpmpc.preview.stages import StageBuilder, Stages
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.cvxpy_twin import CvxpyTwin
@@ -25,7 +23,7 @@ from qpmpc.qp.structure import VARS, Var
 from qpmpc.solvers.base import Status
 from qpmpc.solvers.piqp import Piqp
 from qpmpc.solvers.timed import require
-from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.trip import Trip
 from qpmpc.verification.renderings.casadi_qp import CasadiQp
 from qpmpc.verification.renderings.cvxpy_matrices import cvxpy_matrices
 from qpmpc.verification.renderings.generated_qp import GeneratedQp
@@ -93,8 +91,7 @@ class Renderings:
 
     Parameters
     ----------
-    vehicle : plant parameters
-    truth : the trip
+    trip : vehicle and road
     settings : of all controllers; those of `mh_qp` count
 
     Raises
@@ -103,20 +100,20 @@ class Renderings:
         If CasADi, Clarabel, PIQP or QOCO is not installed.
     """
 
-    def __init__(self, vehicle: Vehicle, truth: Trace, settings: ControllerSettings) -> None:
-        chosen = settings.mh_qp
+    def __init__(self, trip: Trip, settings: ControllerSettings) -> None:
+        chosen, vehicle = settings.mh_qp, trip.vehicle
         model = PwaModel.of(vehicle, chosen.pwa)
-        self.preview = StageBuilder(vehicle, truth, truth, chosen.horizon)
+        self.preview = StageBuilder(vehicle, trip.truth, trip.forecast, chosen.horizon)
         stages = self.preview.count
         self.qp = StageQp(vehicle, model, stages, chosen.qp, chosen.scaling)
         self.twin = CvxpyTwin(vehicle, model, stages, chosen.qp)
         self.casadi = CasadiQp(vehicle, model, stages, chosen.qp)
         self.generated: GeneratedQp | None = None
         if compiler() is not None:
-            blocks = chosen.horizon.block_count(truth.steps)
-            to_the_end = settings.with_settings({"mh_qp.osqp.rho": C_RHO})
+            blocks = chosen.horizon.block_count(trip.forecast.steps)
+            to_the_end = settings.with_settings({"mh_qp.admm.rho": C_RHO})
             values = values_of(vehicle, to_the_end.mh_qp, settings.rule_based, blocks)
-            self.generated = GeneratedQp(values, InputBuilder(self.preview, truth))
+            self.generated = GeneratedQp(values, InputBuilder(trip, chosen))
         self._solver = Piqp(EXACT)
         self._is_set_up = False
 
@@ -153,7 +150,7 @@ class Renderings:
             self._solver.setup(self.qp.structure, data)
             self._is_set_up = True
         solution = self._solver.solve(data, None, None)
-        return solution.z if solution.status is Status.SOLVED else np.full_like(data.q, np.nan)
+        return solution.primal if solution.status is Status.SOLVED else np.full_like(data.q, np.nan)
 
     def _by_cvxpy(self, case: QpCase, data: QpData) -> tuple[Matrices, Floats]:
         self.twin.update(*self.inputs(case), data.scaling)
@@ -203,8 +200,7 @@ def _by_qoco(m: Matrices, column: Floats, cost: float) -> Floats:
 
 
 def check_equivalence(
-    cycle: Cycle,
-    vehicle: Vehicle,
+    trip: Trip,
     every: int = 5,
     random: int = 100,
     seed: int = 1,
@@ -214,7 +210,7 @@ def check_equivalence(
 
     Parameters
     ----------
-    cycle, vehicle : the trip
+    trip : where the cases come from
     every : one recorded case each so many steps
     random, seed : how many random cases, and their seed
     settings : of all controllers
@@ -225,10 +221,9 @@ def check_equivalence(
         If CasADi or a solver is not installed.
     """
     chosen = settings or ControllerSettings()
-    truth = Trace.of(cycle, vehicle)
-    renderings = Renderings(vehicle, truth, chosen)
+    renderings = Renderings(trip, chosen)
     cases = [
-        *recorded_cases(cycle, vehicle, chosen, every),
-        *random_cases(truth, vehicle, renderings.preview.count, random, seed),
+        *recorded_cases(trip, chosen, every),
+        *random_cases(trip, renderings.preview.count, random, seed),
     ]
     return Equivalence([renderings.compare(case) for case in cases])

@@ -10,8 +10,8 @@ from qpmpc.codegen.controller import InputBuilder
 from qpmpc.codegen.generate import project_files
 from qpmpc.codegen.host_library import HostLibrary, compiled
 from qpmpc.codegen.values import Values
-from qpmpc.controllers.base import Observation
 from qpmpc.qp.structure import VARS, Var
+from qpmpc.trip import Observation
 from qpmpc.verification.renderings.matrices import Matrices, matrices_from
 
 Floats = NDArray[np.float64]

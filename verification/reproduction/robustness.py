@@ -8,11 +8,11 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle
 from qpmpc.preview.forecast_errors import MODELS, forecast
 from qpmpc.results import Run
-from qpmpc.simulate import simulate
+from qpmpc.simulation import simulate
 from qpmpc.vehicle.parameters import Vehicle
 
 CONTROLLER = "mh-qp"

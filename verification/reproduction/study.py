@@ -6,19 +6,18 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from qpmpc.comparison import compare_runs
-from qpmpc.controllers.base import Decision, Observation
-from qpmpc.controllers.factory import ControllerSettings, make_controller
-from qpmpc.controllers.mh_qp import MhQp
-from qpmpc.controllers.planner import Plan
+from qpmpc.closed_loop import drive
+from qpmpc.controllers.base import Decision
+from qpmpc.controllers.qp_planner import QpPlan, QpPlanner
+from qpmpc.controllers.receding_horizon import RecedingHorizon
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle
 from qpmpc.preview.forecast import Trace
-from qpmpc.results import Run
-from qpmpc.runners import run as run_one
-from qpmpc.simulate import simulate
+from qpmpc.results import Run, compare_runs
+from qpmpc.simulation import simulate
+from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.parameters import Vehicle
-from qpmpc.vehicle.plant import Plant
-from qpmpc.verification.dynamic_programming import DpSolution, solve_dp
+from qpmpc.verification.dynamic_programming import DpSettings, DpSolution, solve_dp
 from qpmpc.verification.reproduction.robustness import ForecastRun, run_forecasts
 from qpmpc.verification.reproduction.variants import (
     EXPERIMENTS,
@@ -56,7 +55,7 @@ class Snapshot:
 
     label: str
     step: int
-    plan: Plan
+    plan: QpPlan
     truth: Trace
 
 
@@ -113,30 +112,31 @@ def run_study(vehicle: Vehicle, settings: ControllerSettings, extent: Extent, jo
     jobs : told of each job; there are `job_count(extent)`
     """
     if extent.dp is not None:
-        settings = settings.model_copy(update={"dp": extent.dp})
+        settings = settings.with_section("dp", extent.dp)
 
-    def drive(cycle: Cycle, variant: Variant) -> Run:
+    grid = settings.of("dp", DpSettings())
+
+    def run_variant(cycle: Cycle, variant: Variant) -> Run:
         report = jobs.next_job(f"{cycle.name}, {variant.label}")
         chosen = settings.with_settings(variant.settings)
-        run = run_one(cycle, variant.controller, vehicle, chosen, report)
+        run = simulate(cycle, variant.controller, vehicle, settings=chosen, progress=report)
         return replace(run, controller=variant.label)
 
     runs = {
-        (cycle.name, variant.label): drive(cycle, variant)
+        (cycle.name, variant.label): run_variant(cycle, variant)
         for cycle in extent.all_cycles
         for variant in VARIANTS
     }
     tried = {
-        (cycle.name, variant.label): drive(cycle, variant)
+        (cycle.name, variant.label): run_variant(cycle, variant)
         for cycle in extent.cycles
         for variant in EXPERIMENTS
     }
     measures = [run for (_, label), run in runs.items() if label in (RULES, OPTIMUM)]
     jobs.next_job("horizons")
-    first = extent.cycles[0]
+    first = Trip(extent.cycles[0], vehicle)
     snapshots = tuple(
-        _snapshot(first, label, vehicle, settings, extent.snapshot_step)
-        for label in (PAPER_GRID, OURS)
+        _snapshot(first, label, settings, extent.snapshot_step) for label in (PAPER_GRID, OURS)
     )
     forecasts = []
     for cycle in extent.all_cycles:
@@ -149,7 +149,7 @@ def run_study(vehicle: Vehicle, settings: ControllerSettings, extent: Extent, jo
         extent=extent,
         runs=runs,
         rows=_rows([*runs.values()]),
-        optima={c.name: solve_dp(c, vehicle, settings.dp) for c in extent.all_cycles},
+        optima={c.name: solve_dp(c, vehicle, grid) for c in extent.all_cycles},
         experiments={
             key: row for key, row in _rows([*tried.values(), *measures]).items() if key in tried
         },
@@ -169,33 +169,16 @@ def _rows(runs: list[Run]) -> dict[tuple[str, str], Row]:
     return rows
 
 
-class _Watch:
-    """A controller that is watched: keeps its plan of one step."""
+def _snapshot(trip: Trip, label: str, settings: ControllerSettings, step: int) -> Snapshot:
+    of_qp = settings.mh_qp if label == OURS else settings.mh_qp_paper
+    planner = QpPlanner(trip, settings, of_qp, name=label)
+    plans: list[QpPlan] = []
 
-    solver_name = ""
+    def keep(seen: Observation, _: Decision) -> None:
+        if seen.step == step and planner.last is not None:
+            plans.append(planner.last)
 
-    def __init__(self, controller: MhQp, step: int) -> None:
-        self.name = controller.name
-        self._controller, self._step = controller, step
-        self.plan: Plan | None = None
-
-    def decide(self, seen: Observation) -> Decision:
-        decision = self._controller.decide(seen)
-        if seen.step == self._step:
-            self.plan = self._controller.planner.plan
-        return decision
-
-
-def _snapshot(
-    cycle: Cycle, label: str, vehicle: Vehicle, settings: ControllerSettings, step: int
-) -> Snapshot:
-    truth = Trace.of(cycle, vehicle)
-    settings = settings.with_settings({"mh_qp.solver": "osqp"})  # whose plan can be looked at
-    controller = make_controller(label, Plant(vehicle), truth, settings=settings)
-    if not isinstance(controller, MhQp):
-        raise TypeError(f"{label} has no horizon to show")
-    watch = _Watch(controller, step)
-    simulate(cycle, watch, vehicle)
-    if watch.plan is None:
+    drive(trip, RecedingHorizon(trip, planner), on_step=keep)
+    if not plans:
         raise RuntimeError(f"{label} has no plan at step {step}")
-    return Snapshot(label, step, watch.plan, truth)
+    return Snapshot(label, step, plans[0], trip.truth)

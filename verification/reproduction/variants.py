@@ -53,16 +53,16 @@ EXPERIMENTS = (
         {"mh_qp_paper.horizon.classes": 3},
     ),
     Variant("paper's grid, blocks of 5 s", PAPER_GRID, {"mh_qp_paper.horizon.block_s": 5}),
-    Variant("paper's grid, 1000 iterations", PAPER_GRID, {"mh_qp_paper.osqp.iterations": 1000}),
+    Variant("paper's grid, 1000 iterations", PAPER_GRID, {"mh_qp_paper.admm.iterations": 1000}),
     Variant(
         "baseline H=20, 1000 iterations",
         "baseline-mpc",
-        {"baseline_mpc.horizon_s": 20, "baseline_mpc.osqp.iterations": 1000},
+        {"baseline_mpc.horizon_s": 20, "baseline_mpc.admm.iterations": 1000},
     ),
     Variant(
         "baseline H=100, 1000 iterations",
         "baseline-mpc",
-        {"baseline_mpc.horizon_s": 100, "baseline_mpc.osqp.iterations": 1000},
+        {"baseline_mpc.horizon_s": 100, "baseline_mpc.admm.iterations": 1000},
     ),
     Variant(
         "rules, on above 5 kW, at least 5 kW",

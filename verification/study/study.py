@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle
-from qpmpc.simulate import simulate
+from qpmpc.simulation import simulate
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.verification.dynamic_programming import solve_dp
 from qpmpc.verification.study.variants import Variant

@@ -26,9 +26,9 @@ def _one(group: str, key: str, *values: object) -> list[Variant]:
 def variants() -> tuple[Variant, ...]:
     """Return the default and all its variants."""
     found = [Variant("default", "default")]
-    found += _one("iterations K", "osqp.iterations", 10, 15, 25, 35, 100, 200, 400)
-    found += _one("rho", "osqp.rho", 0.01, 0.03, 0.3, 1.0)
-    found += _one("over-relaxation", "osqp.relaxation", 1.0, 1.4, 1.8)
+    found += _one("iterations K", "admm.iterations", 10, 15, 25, 35, 100, 200, 400)
+    found += _one("rho", "admm.rho", 0.01, 0.03, 0.3, 1.0)
+    found += _one("over-relaxation", "admm.relaxation", 1.0, 1.4, 1.8)
     found += _one("regularisation", "qp.regularisation", 1e-3, 1e-4, 1e-6)
     found += _one("energy unit, J", "scaling.energy_j", 5e3, 12.5e3, 25e3, 80e3)
     found += _one("coolant unit, K", "scaling.t_cl_k", 0.5, 1.0, 4.0)

@@ -1,29 +1,25 @@
-"""Backends by name."""
-
-from collections.abc import Callable
-from importlib import import_module
+"""QP backends by name; other packages add theirs by entry points of ``qpmpc.solvers``."""
 
 from qpmpc.errors import InputError
+from qpmpc.names import Names, Shipped
 from qpmpc.solvers.base import QpSolver
-from qpmpc.solvers.osqp import Osqp
 from qpmpc.solvers.timed import DEFAULT_TOLERANCE, require
 
-# module: class; imported when asked for, as each needs a package of its own
-_NATIVE = {
-    "piqp": "Piqp",
-    "clarabel": "Clarabel",
-    "daqp": "Daqp",
-    "qoco": "Qoco",
-    "highs": "Highs",
-    "proxqp": "Proxqp",
-    "scs": "Scs",
-}
 _THROUGH = "qpsolvers:"
+
+SOLVERS = Names(
+    "solver",
+    {
+        name: Shipped(f"qpmpc.solvers.{name}:{name.capitalize()}")
+        for name in ("osqp", "piqp", "clarabel", "daqp", "qoco", "highs", "proxqp", "scs")
+    },
+    also=f", or {_THROUGH}NAME",
+)
 
 
 def solver_names() -> tuple[str, ...]:
     """Return the names of the native backends, the default first."""
-    return ("osqp", *_NATIVE)
+    return tuple(SOLVERS.shipped)
 
 
 def make_solver(name: str, tolerance: float = DEFAULT_TOLERANCE) -> QpSolver:
@@ -31,27 +27,20 @@ def make_solver(name: str, tolerance: float = DEFAULT_TOLERANCE) -> QpSolver:
 
     Parameters
     ----------
-    name : one of `solver_names`, or ``qpsolvers:NAME`` for any solver that qpsolvers finds
-    tolerance : on the KKT residuals; OSQP runs a fixed number of iterations instead
-        (`OsqpSettings`)
+    name : one of `SOLVERS`, or ``qpsolvers:NAME`` for any solver that qpsolvers finds
+    tolerance : of the shipped backends, on the KKT residuals; OSQP runs a fixed number of
+        iterations instead (`AdmmSettings`)
 
     Raises
     ------
     InputError
         If the name is unknown, its package is not installed, or the tolerance is out of range.
     """
-    if name == "osqp":
-        return Osqp()
-    if name in _NATIVE:
-        backend: Callable[[float], QpSolver] = getattr(
-            import_module(f"qpmpc.solvers.{name}"), _NATIVE[name]
-        )
-        return backend(tolerance)
     if name.startswith(_THROUGH):
         return _through_qpsolvers(name.removeprefix(_THROUGH), tolerance)
-    raise InputError(
-        f"unknown solver {name!r}: use one of {', '.join(solver_names())}, or {_THROUGH}NAME"
-    )
+    backend = SOLVERS.find(name)
+    made: QpSolver = backend() if name == "osqp" or name in SOLVERS.added else backend(tolerance)
+    return made
 
 
 def _through_qpsolvers(solver: str, tolerance: float) -> QpSolver:

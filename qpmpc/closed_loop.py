@@ -1,0 +1,67 @@
+"""Closed loop: a controller drives a trip on the plant, second by second."""
+
+from collections.abc import Callable
+from time import perf_counter
+
+import numpy as np
+
+from qpmpc.controllers.base import Controller, Decision, Progress
+from qpmpc.results import Run, Trajectory
+from qpmpc.trip import Observation, Trip
+
+OnStep = Callable[[Observation, Decision], None]
+
+
+def drive(
+    trip: Trip,
+    controller: Controller,
+    *,
+    on_step: OnStep | None = None,
+    progress: Progress | None = None,
+) -> Run:
+    """Drive a trip in closed loop on the nonlinear plant.
+
+    Parameters
+    ----------
+    trip : whose cycle is the truth
+    controller : made for this trip, and not used since
+    on_step : called as on_step(observation, decision) after each decision, before the plant moves;
+        its time does not count as the controller's
+    progress : called as progress(steps done, steps in all); before that, of a controller that
+        takes long to depart, as it counts
+
+    Raises
+    ------
+    QpmpcError
+        If the controller belongs to another trip or has driven already.
+    """
+    controller.begin(trip, progress)
+    plant, steps = trip.plant, trip.steps
+    record = Trajectory.empty(steps)
+    state = plant.initial_state()
+    record.soc[0], record.t_cl_degc[0] = state.soc, state.t_cl_degc
+    report = progress if controller.decides_online else None
+    for t in range(steps):
+        seen = trip.observation(t, state)
+        start = perf_counter()
+        decision = controller.decide(seen)
+        record.step_time_s[t] = perf_counter() - start
+        if on_step is not None:
+            on_step(seen, decision)
+        state, flows = plant.step(state, decision.command, seen.demand_w, seen.speed_mps)
+        record.store(t, state, flows, decision)
+        if report is not None:
+            report(t + 1, steps)
+    if not controller.decides_online:
+        record.step_time_s[:] = np.nan
+    record.demand_w[:], record.speed_mps[:] = trip.truth.demand_w, trip.truth.speed_mps
+    return Run(
+        cycle=trip.cycle.name,
+        controller=controller.name,
+        solver=controller.solver_name,
+        implementation=controller.implementation,
+        remarks=tuple(controller.remarks),
+        vehicle=trip.vehicle,
+        distance_km=trip.cycle.distance_m / 1e3,
+        trajectory=record,
+    )

@@ -1,0 +1,75 @@
+"""`mh-qp` written in cvxpy as a planner: to change its problem and drive with the result."""
+
+from typing import Any
+
+from qpmpc.controllers.receding_horizon import Plan, Planner
+from qpmpc.controllers.settings import ControllerSettings
+from qpmpc.errors import QpmpcError
+from qpmpc.preview.stages import StageBuilder
+from qpmpc.pwa.model import PwaModel
+from qpmpc.qp.cvxpy_twin import CvxpyTwin
+from qpmpc.qp.linearisation import Linearisation
+from qpmpc.qp.structure import Var
+from qpmpc.trip import Observation, Trip
+
+
+class CvxpyPlanner(Planner):
+    """Plans with the QP of `mh-qp` as a cvxpy program, solved to the end each second.
+
+    A subclass adds to the program in `terms`. The program must keep to cvxpy's rules for
+    parametrised programs (DPP), or it is compiled anew each second.
+
+    Parameters
+    ----------
+    trip, settings : as of `Planner`; the settings of `mh_qp` count, its solver's left out
+
+    Attributes
+    ----------
+    solver : that cvxpy calls; a class attribute will do
+    program : the program, with its expressions, objective and constraints
+    """
+
+    name = "mh-cvxpy"
+    solver = "CLARABEL"
+
+    def __init__(self, trip: Trip, settings: ControllerSettings | None = None) -> None:
+        super().__init__(trip, settings)
+        of_qp, vehicle = self.settings.mh_qp, trip.vehicle
+        self.solver_name = f"cvxpy {self.solver.lower()}"
+        self.preview = StageBuilder(vehicle, trip.truth, trip.forecast, of_qp.horizon)
+        model = PwaModel.of(vehicle, of_qp.pwa)
+        self.program = CvxpyTwin(vehicle, model, self.preview.count, of_qp.qp)
+        self.program.add(*self.terms(self.program))
+        self._about: Linearisation | None = None
+
+    def terms(self, program: CvxpyTwin) -> tuple[Any, list[Any]]:
+        """Return what to add to the program: a cost in grams, and constraints.
+
+        Parameters
+        ----------
+        program : its attributes are cvxpy expressions over the stages, see `CvxpyTwin`
+        """
+        return 0.0, []
+
+    def depart(self, seen: Observation) -> None:
+        """Forget any trip before."""
+        self.forget()
+
+    def forget(self) -> None:
+        """Expand the coolant about nothing known, as after a restart of the ECU on the road."""
+        self._about = None
+
+    def plan(self, seen: Observation) -> Plan:
+        """Solve the program of this second; without a solution there is no plan."""
+        about = self._about or Linearisation.constant(self.preview.count, seen.t_cl_degc)
+        self.program.update(self.preview.at(seen.step), seen.soc, seen.t_cl_degc, about)
+        try:
+            x = self.program.solve(self.solver)
+        except QpmpcError:
+            self.forget()
+            return Plan.none()
+        # short stages move up by one second until the next time
+        layout = self.preview.settings
+        self._about = Linearisation.about(x[self.preview.shift()], seen.t_cl_degc, layout)
+        short = slice(layout.short_stages)
+        return Plan.of_means(x[short, Var.ON], x[short, Var.P_ENG])

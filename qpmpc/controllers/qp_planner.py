@@ -1,0 +1,245 @@
+"""Planner of `mh-qp`: one QP a second, linearised about and warm-started from the last, shifted."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpmpc.controllers.receding_horizon import Plan, Planner, power_while_on_w
+from qpmpc.controllers.settings import ControllerSettings, MhQpSettings
+from qpmpc.errors import InputError
+from qpmpc.preview.stages import StageBuilder, Stages
+from qpmpc.pwa.model import PwaModel
+from qpmpc.qp.linearisation import Linearisation
+from qpmpc.qp.stage_qp import QpData, StageQp
+from qpmpc.qp.structure import VARS, Var
+from qpmpc.solvers.base import QpSolution, QpSolver
+from qpmpc.solvers.names import make_solver
+from qpmpc.solvers.osqp import Osqp
+from qpmpc.solvers.settings import AdmmSettings
+from qpmpc.trip import Observation, Trip
+
+Floats = NDArray[np.float64]
+
+DEPARTURE_LINEARISATIONS = 5
+FAILURES_FORGIVEN = 2  # unusable solutions in a row that do not cost the plan before them
+WARM_UP_STEPS = 5  # of K iterations; measured: fewer gain nothing, more leave the rules driving
+
+
+LEAST_SIZE_W = 1000.0  # power that the relaxation gap is relative to, at least
+
+
+@dataclass(frozen=True)
+class QpPlan:
+    """Solution of one QP in SI units.
+
+    Attributes
+    ----------
+    stages : the horizon
+    x : variables, shape (n, VARS), columns as in `Var`
+    duals : g of fuel per SI unit of each row, shape (n, rows)
+    solution : what the solver said
+    """
+
+    stages: Stages
+    x: Floats
+    duals: Floats
+    solution: QpSolution
+
+
+@dataclass(frozen=True)
+class Solve:
+    """One QP on its way through the solver, in solver units.
+
+    Attributes
+    ----------
+    data : values
+    primal, dual : start, None where it is cold
+    cold : whether it was solved to the end, before departure
+    solution : what came of it
+    """
+
+    data: QpData
+    primal: Floats | None
+    dual: Floats | None
+    cold: bool
+    solution: QpSolution
+
+
+class QpPlanner(Planner):
+    """Solves the trip's QP step after step, each in the same fixed time.
+
+    A QP this close to a linear program needs some thousand iterations from cold. `depart` spends
+    them before the trip starts, when time does not matter. Without it, or after a reset on the
+    road, every step spends the same K iterations from the last one's result, and the plan stays
+    unusable for `WARM_UP_STEPS` steps, in which something else has to drive.
+
+    Parameters
+    ----------
+    trip, settings : as of `Planner`
+    of_qp : horizon, PWA curves, weights, scaling, solver; those of `mh_qp` if None
+    name : under which results are reported
+    solver : backend; that of the settings if None
+    on_solve : called with every QP solved
+
+    Attributes
+    ----------
+    last : last usable solution, None after a reset
+    ready : whether the plan may be acted on
+
+    Raises
+    ------
+    InputError
+        If the settings ask for a solver that there is not, or for one that they do not fit.
+    """
+
+    def __init__(
+        self,
+        trip: Trip,
+        settings: ControllerSettings | None = None,
+        of_qp: MhQpSettings | None = None,
+        *,
+        name: str = "mh-qp",
+        solver: QpSolver | None = None,
+        on_solve: Callable[[Solve], None] | None = None,
+    ) -> None:
+        super().__init__(trip, settings)
+        self.of_qp = of_qp or self.settings.mh_qp
+        self.name = name
+        self.solver = solver or _backend(self.of_qp, name)
+        self.solver_name = self.solver.name
+        self.on_solve = on_solve
+        vehicle = trip.vehicle
+        self.preview = StageBuilder(vehicle, trip.truth, trip.forecast, self.of_qp.horizon)
+        self.model = PwaModel.of(vehicle, self.of_qp.pwa)
+        self.qp = StageQp(
+            vehicle, self.model, self.preview.count, self.of_qp.qp, self.of_qp.scaling
+        )
+        self.last: QpPlan | None = None
+        self._last_step = 0
+        self._solves = 0
+        self._failures = 0
+        self._is_set_up = False
+        self._shift = self.preview.shift()
+
+    @property
+    def ready(self) -> bool:
+        """Whether enough iterations have been spent since the last reset."""
+        return self._solves >= WARM_UP_STEPS
+
+    def depart(self, seen: Observation) -> None:
+        """Solve the QP of departure from cold, with several linearisations, to the end."""
+        self.forget()
+        if not self.of_qp.prepared:
+            return
+        stages, t_cl_degc = self.preview.at(seen.step), seen.t_cl_degc
+        about, start = Linearisation.constant(self.preview.count, t_cl_degc), None
+        for _ in range(DEPARTURE_LINEARISATIONS):
+            plan = self._solve(stages, seen, about, start, cold=True)
+            if not plan.solution.usable:
+                return
+            about, start = self._about(plan.x, t_cl_degc), (plan.x, plan.duals)
+        self.last, self._last_step, self._solves = plan, seen.step, WARM_UP_STEPS
+
+    def plan(self, seen: Observation) -> Plan:
+        """Spend one step's iterations on the QP of this second."""
+        solved = self.solve(seen)
+        iterations = solved.solution.iterations
+        if not (solved.solution.usable and self.ready):
+            return Plan.none(iterations)
+        short = slice(self.of_qp.horizon.short_stages)
+        on_share = solved.x[short, Var.ON]
+        power_w = power_while_on_w(on_share, solved.x[short, Var.P_ENG])
+        return Plan(on_share, power_w, True, iterations, self._relaxation_gap(solved))
+
+    def solve(self, seen: Observation) -> QpPlan:
+        """Solve the QP of this second, from the last usable solution, shifted along.
+
+        It is shifted by as many steps as have passed; after a reset there is none. An unusable
+        result leaves that solution in place, until so many came in a row that it may be the reason:
+        then the next step starts from nothing.
+        """
+        stages, t_cl_degc = self.preview.at(seen.step), seen.t_cl_degc
+        if self.last is None:
+            about, start = Linearisation.constant(self.preview.count, t_cl_degc), None
+        else:
+            x, duals = self.last.x, self.last.duals
+            for _ in range(seen.step - self._last_step):
+                x, duals = x[self._shift], duals[self._shift]
+            about, start = self._about(x, t_cl_degc), (x, duals)
+        plan = self._solve(stages, seen, about, start)
+        if plan.solution.usable:
+            self.last, self._last_step = plan, seen.step
+            self._solves += 1
+            self._failures = 0
+        elif self._failures < FAILURES_FORGIVEN:
+            self._failures += 1
+        else:
+            self.forget()
+        return plan
+
+    def forget(self) -> None:
+        """Forget the last solution, as after a restart of the controller on the road."""
+        self.last, self._solves, self._failures = None, 0, 0
+
+    def _about(self, x: Floats, t_cl_degc: float) -> Linearisation:
+        return Linearisation.about(x, t_cl_degc, self.preview.settings)
+
+    def _solve(
+        self,
+        stages: Stages,
+        seen: Observation,
+        about: Linearisation,
+        start: tuple[Floats, Floats] | None,
+        cold: bool = False,
+    ) -> QpPlan:
+        data = self.qp.update(stages, seen.soc, seen.t_cl_degc, about)
+        if not self._is_set_up:
+            self.solver.setup(self.qp.structure, data)
+            self._is_set_up = True
+        primal = dual = None
+        if start is not None:
+            primal = data.scaling.solver_primal(start[0].ravel())
+            dual = data.scaling.solver_dual(start[1].ravel())
+        solution = self.solver.solve(data, primal, dual, cold=cold)
+        if self.on_solve is not None:
+            self.on_solve(Solve(data, primal, dual, cold, solution))
+        return QpPlan(
+            stages,
+            data.scaling.primal(solution.primal).reshape(-1, VARS),
+            data.scaling.dual(solution.dual).reshape(len(stages.duration_s), -1),
+            solution,
+        )
+
+    def _relaxation_gap(self, plan: QpPlan) -> float:
+        """Slack of the relaxed inequalities at the applied stage, relative.
+
+        (|F - F_pwa| LHV + |G - G_pwa|) / max(|F| LHV + |G|, 1 kW), where F_pwa and G_pwa are the
+        relaxed curves at (E, sigma): zero when both inequalities are tight.
+        """
+        x, net_w = plan.x[0], float(plan.stages.net_w[0])
+        p_eng, on = float(x[Var.P_ENG]), float(x[Var.ON])
+        fuel, battery = self.model.fuel, self.model.battery
+        least_fuel = float((fuel.slope * p_eng + fuel.intercept * on).max())
+        off_w = float(plan.stages.internal_off_w[0])
+        on_part = battery.slope * (on * net_w - p_eng) + battery.intercept * on
+        least_internal = float(on_part.max()) + (1.0 - on) * off_w
+        lhv_j_per_g = self.trip.vehicle.engine.lhv_j_per_g
+        slack = abs(float(x[Var.FUEL]) - least_fuel) * lhv_j_per_g
+        slack += abs(float(x[Var.INTERNAL]) - least_internal)
+        size = abs(float(x[Var.FUEL])) * lhv_j_per_g + abs(float(x[Var.INTERNAL]))
+        return slack / max(size, LEAST_SIZE_W)
+
+
+def _backend(of_qp: MhQpSettings, name: str) -> QpSolver:
+    """Make the backend that the settings name; settings of another one are refused."""
+    chosen = of_qp.solver or "osqp"
+    if chosen == "osqp":
+        return Osqp(of_qp.admm)
+    if of_qp.admm != AdmmSettings():
+        section = name.replace("-", "_")
+        raise InputError(
+            f"{section}.admm has no effect with {section}.solver={chosen}: leave out one of them"
+        )
+    return make_solver(chosen)

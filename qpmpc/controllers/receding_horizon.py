@@ -1,0 +1,150 @@
+"""The receding-horizon loop: plan, realise on/off, keep safe, degrade in steps. Written once."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel
+
+from qpmpc.controllers.base import Controller, Decision, Progress
+from qpmpc.controllers.rule_based import RuleBased
+from qpmpc.controllers.settings import ControllerSettings
+from qpmpc.trip import Observation, Trip
+from qpmpc.vehicle.plant import Command
+
+ON_THRESHOLD = 0.5  # share of a 1 s stage from which the engine runs
+PLAN_VALID_STEPS = 3  # how many steps an old plan may drive before the rules take over
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a planner intends for the seconds ahead.
+
+    Attributes
+    ----------
+    on_share : sigma, share of each second with the engine on, shape (n,), n >= 1
+    power_on_w : engine power while it is on, shape (n,)
+    usable : whether it may be acted on
+    iterations : that the solver took
+    relaxation_gap : slack of the relaxation at the first second, relative; nan if there is none
+    """
+
+    on_share: NDArray[np.float64]
+    power_on_w: NDArray[np.float64]
+    usable: bool = True
+    iterations: int = 0
+    relaxation_gap: float = float("nan")
+
+    @classmethod
+    def of_means(cls, on_share: ArrayLike, p_eng_w: ArrayLike) -> "Plan":
+        """Return the plan of mean engine powers E = sigma P_on; shape (n,) each."""
+        share, mean_w = np.asarray(on_share, dtype=float), np.asarray(p_eng_w, dtype=float)
+        return cls(share, power_while_on_w(share, mean_w))
+
+    @classmethod
+    def none(cls, iterations: int = 0) -> "Plan":
+        """Return what a planner gives that has found no plan."""
+        return cls(np.empty(0), np.empty(0), usable=False, iterations=iterations)
+
+
+def power_while_on_w(
+    on_share: NDArray[np.float64], p_eng_w: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Power E / sigma that a mean power stands for; 0 where the engine will not run."""
+    runs = on_share >= ON_THRESHOLD
+    power = np.zeros_like(p_eng_w)
+    np.divide(p_eng_w, np.minimum(on_share, 1.0), out=power, where=runs)
+    return power
+
+
+class Planner(ABC):
+    """Plans the engine over the seconds ahead, once a second; `RecedingHorizon` does the rest.
+
+    A subclass writes `plan`. Where it raises nothing and returns an unusable plan, the ladder of
+    `RecedingHorizon` takes over.
+
+    Parameters
+    ----------
+    trip : what the planner may look at: `trip.vehicle`, and the road ahead through
+        `qpmpc.preview.StageBuilder`
+    settings : of all controllers
+
+    Attributes
+    ----------
+    name, solver_name, Settings : as of `Controller`
+    """
+
+    name: str = "own"
+    solver_name: str = ""
+    Settings: ClassVar[type[BaseModel] | None] = None
+
+    def __init__(self, trip: Trip, settings: ControllerSettings | None = None) -> None:
+        self.trip = trip
+        self.settings = settings or ControllerSettings()
+
+    def depart(self, seen: Observation) -> None:  # noqa: B027
+        """Prepare the first plan before the trip starts, and forget any trip before."""
+
+    @abstractmethod
+    def plan(self, seen: Observation) -> Plan:
+        """Plan from the measured state on."""
+
+    def forget(self) -> None:  # noqa: B027
+        """Forget plan and warm start, as after a restart of the ECU on the road."""
+
+
+class RecedingHorizon(Controller):
+    """Drives by a planner: its plan, else its last plan shifted, else the rules.
+
+    The rules watch every second, so that their timers are right if they have to take over. The
+    safety layer has the last word in any case.
+
+    Parameters
+    ----------
+    trip : to be driven
+    planner : made for the same trip
+    settings : of all controllers; `rule_based` has the thresholds of the last rung
+    """
+
+    def __init__(
+        self, trip: Trip, planner: Planner, settings: ControllerSettings | None = None
+    ) -> None:
+        super().__init__(trip, settings or planner.settings)
+        self.planner = planner
+        self.name, self.solver_name = planner.name, planner.solver_name
+        self._rules = RuleBased(trip, self.settings)
+        self._old: Plan | None = None
+        self._old_step = 0
+
+    def depart(self, progress: Progress | None = None) -> None:
+        """Let the planner prepare its first plan."""
+        self._rules.reset()
+        self._old = None
+        self.planner.depart(self.trip.start)
+
+    def step(self, seen: Observation) -> Decision:
+        """Run one step: the plan, else the shifted last plan, else the rules."""
+        ruled = self._rules.decide(seen)
+        plan = self.planner.plan(seen)
+        if plan.usable:
+            self._old, self._old_step = plan, seen.step
+            on_share = float(plan.on_share[0])
+            return Decision(_at(plan, 0), "", plan.iterations, plan.relaxation_gap, on_share)
+        age = seen.step - self._old_step
+        if self._old is not None and age < min(PLAN_VALID_STEPS + 1, len(self._old.on_share)):
+            return Decision(_at(self._old, age), "shifted plan", plan.iterations)
+        return Decision(ruled.command, "rule-based", plan.iterations)
+
+    def forget(self) -> None:
+        """Forget plan and warm start, as after a restart of the ECU on the road."""
+        self.planner.forget()
+        self._old = None
+
+
+def _at(plan: Plan, second: int) -> Command:
+    """On/off from the on-share: on from one half up, at the power planned for that."""
+    if plan.on_share[second] < ON_THRESHOLD:
+        return Command(False, 0.0)
+    return Command(True, float(plan.power_on_w[second]))

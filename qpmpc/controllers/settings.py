@@ -1,0 +1,235 @@
+"""Settings of the shipped controllers, and how dotted names reach them."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from qpmpc.errors import InputError
+from qpmpc.preview.horizon import HorizonSettings
+from qpmpc.pwa.model import PwaTolerances
+from qpmpc.qp.scaling import ScalingSettings
+from qpmpc.qp.stage_qp import QpSettings
+from qpmpc.settings import apply_settings, validated
+from qpmpc.solvers.settings import AdmmSettings
+
+Model = TypeVar("Model", bound=BaseModel)
+Watts = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Factor = Annotated[float, Field(ge=0.0, le=20.0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+
+
+class RuleBasedSettings(BaseModel):
+    """Thresholds; load levelling after Liu, Peng, Filipi (2005), heat request after the paper.
+
+    Attributes
+    ----------
+    k_soc_w : P_r = P_d + P_aux + k_soc (SOC_ref - SOC)
+    balance : choose SOC_ref for the trip at hand so that it ends at its initial SOC
+    soc_ref_offset : SOC_ref - SOC_init, used as it is without `balance`
+    on_w, off_w : the engine starts above the first and stops below the second
+    min_on_s : shortest run
+    power_min_w : least power when it runs for power
+    heat_power_w : power when it runs for heat alone
+    heat_on_degc, heat_off_degc : heat request below the first, until above the second
+    soc_forced : forced on below this SOC
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    k_soc_w: Watts = 100e3
+    balance: bool = True
+    soc_ref_offset: Annotated[float, Field(ge=-0.3, le=0.3)] = 0.0
+    on_w: Watts = 8e3
+    off_w: Watts = 3e3
+    min_on_s: Annotated[int, Field(ge=0, le=600)] = 5
+    power_min_w: Watts = 8e3
+    heat_power_w: Watts = 4e3
+    heat_on_degc: float = 50.0
+    heat_off_degc: float = 52.0
+    soc_forced: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.45
+
+
+class MhQpSettings(BaseModel):
+    """Everything that shapes the controller; dotted names such as `mh_qp.admm.iterations`.
+
+    Attributes
+    ----------
+    implementation : `c` (the whole controller in C, compiled for this machine), `python`, or
+        `auto`: C where there is a compiler and the settings allow, which is said where they do not
+    solver : QP backend of the Python implementation, see `qpmpc.solvers`. Not set: ADMM with the
+        iterations of `admm`, which is OSQP in Python and our own writing of it in C
+    admm : of the solver that is not set, and of `osqp`
+    prepared : solve the first QP before the trip starts; if not, the rules drive the first steps
+        while the solver warms up
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    horizon: HorizonSettings = HorizonSettings()
+    pwa: PwaTolerances = PwaTolerances()
+    qp: QpSettings = QpSettings()
+    scaling: ScalingSettings = ScalingSettings()
+    admm: AdmmSettings = AdmmSettings()
+    implementation: Literal["auto", "c", "python"] = "auto"
+    solver: str | None = None
+    prepared: bool = True
+
+
+PAPER = MhQpSettings(
+    implementation="python",
+    horizon=HorizonSettings(short_stages=20, blocks=0, block_s=20, classes=1),
+)
+
+
+class BaselineMpcSettings(BaseModel):
+    """Horizon, terminal penalty and what the baseline shares with `mh-qp`.
+
+    The default penalty lambda is the least, in a scan from 1e3 to 1e5 g on NYCC and the truncated
+    NEDC, that ends each trip within 0.01 of its initial SOC; a larger one moves SOC-balanced fuel
+    by no more than 0.2 % (docs/reproduction.md has the table).
+
+    Attributes
+    ----------
+    horizon_s : H, the paper has 20, 50 and 100
+    qp : as in `mh-qp`; its `soc_penalty_g` is lambda of lambda (SOC(t+H) - SOC_ref)^2
+    pwa, scaling, admm : as in `mh-qp`
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    horizon_s: Annotated[int, Field(ge=1, le=2000)] = 20
+    qp: QpSettings = QpSettings(soc_penalty_g=30e3)
+    pwa: PwaTolerances = PwaTolerances()
+    scaling: ScalingSettings = ScalingSettings()
+    admm: AdmmSettings = AdmmSettings()
+
+    def as_mh_qp(self) -> MhQpSettings:
+        """The same problem as a multi-horizon one without a long horizon."""
+        return MhQpSettings(
+            implementation="python",
+            horizon=HorizonSettings(short_stages=self.horizon_s, blocks=0, block_s=0, classes=1),
+            pwa=self.pwa,
+            qp=self.qp,
+            scaling=self.scaling,
+            admm=self.admm,
+        )
+
+
+class EcmsSettings(BaseModel):
+    """Costates of the adaptive ECMS and how they follow the state.
+
+    The defaults come from a scan on NYCC and the truncated NEDC: a tuning to the trips at hand,
+    which `mh-qp` does without.
+
+    Attributes
+    ----------
+    factor : s at the reference SOC, fuel energy that a unit of stored battery energy is worth
+    factor_per_soc : how much s rises for a unit of SOC below the reference
+    factor_per_soc_s : how much s rises each second for a unit of SOC below the reference
+    factor_min, factor_max : range of s
+    t_cl_band_k : coolant heat is worth something within this distance of its lower limit
+    heat_factor : fuel energy that coolant heat is worth at the limit itself, per unit
+    power_step_w : spacing of the engine powers compared
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    factor: Factor = 2.7
+    factor_per_soc: NotNegative = 10.0
+    factor_per_soc_s: NotNegative = 0.02
+    factor_min: Factor = 1.5
+    factor_max: Factor = 5.0
+    t_cl_band_k: Positive = 3.0
+    heat_factor: Factor = 1.5
+    power_step_w: Annotated[float, Field(ge=10.0, le=10e3)] = 250.0
+
+
+class ControllerSettings(BaseModel):
+    """Settings of every controller; the first part of a dotted name picks the controller.
+
+    Attributes
+    ----------
+    others : what was set of sections that other packages own, by section and dotted name
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    rule_based: RuleBasedSettings = RuleBasedSettings()
+    mh_qp: MhQpSettings = MhQpSettings()
+    mh_qp_paper: MhQpSettings = PAPER
+    baseline_mpc: BaselineMpcSettings = BaselineMpcSettings()
+    ecms: EcmsSettings = EcmsSettings()
+    others: dict[str, dict[str, Any]] = {}
+
+    @classmethod
+    def sections(cls) -> tuple[str, ...]:
+        """Return the names of the sections of shipped controllers."""
+        return tuple(name for name in cls.model_fields if name != "others")
+
+    def of(self, section: str, default: Model) -> Model:
+        """Return the settings of a section that another package owns.
+
+        Raises
+        ------
+        InputError
+            If what was set does not exist or is not allowed.
+        """
+        changed = self.others.get(section, {})
+        if not changed:
+            return default
+        data = apply_settings(default.model_dump(), changed, owner=section)
+        return validated(type(default), data, section)
+
+    def with_section(self, section: str, values: BaseModel) -> "ControllerSettings":
+        """Return a copy in which a section that another package owns has these values."""
+        others = {**self.others, section: values.model_dump()}
+        return self.model_copy(update={"others": others})
+
+    def with_settings(self, settings: Mapping[str, object]) -> "ControllerSettings":
+        """Return a copy with dotted keys replaced, e.g. ``{"mh_qp.admm.iterations": 25}``.
+
+        Sections that no shipped controller has are kept as they are; who owns them checks them.
+
+        Raises
+        ------
+        InputError
+            If a key does not exist or a value is not allowed.
+        """
+        ours: dict[str, object] = {}
+        others = {section: dict(values) for section, values in self.others.items()}
+        for key, value in settings.items():
+            refuse_old_name(key, value)
+            section, _, rest = key.partition(".")
+            if section in self.sections() or not rest:
+                ours[key] = value
+            else:
+                others.setdefault(section, {})[rest] = value
+        data = apply_settings(self.model_dump(), ours, owner="controller settings")
+        data["others"] = others
+        return validated(ControllerSettings, data, "controller settings")
+
+
+# What settings were called, below the section of the controller, and are called now.
+RENAMED = {"osqp.sigma": "admm.proximal_weight", "osqp": "admm"}
+OLD_SOLVERS = {"auto": "auto", "generated": "c"}
+
+
+def refuse_old_name(key: str, value: object) -> None:
+    """Refuse a setting by the name that it had before version 0.2.
+
+    Raises
+    ------
+    InputError
+        One line with the new name.
+    """
+    section, _, rest = key.partition(".")
+    if section not in ("mh_qp", "mh_qp_paper", "baseline_mpc"):
+        return
+    for old, new in RENAMED.items():
+        if rest == old or rest.startswith(f"{old}."):
+            raise InputError(f"{key} is now called {section}.{new}{rest.removeprefix(old)}")
+    if rest == "solver" and value in OLD_SOLVERS:
+        now = OLD_SOLVERS[str(value)]
+        raise InputError(f"{key}={value} is now called {section}.implementation={now}")

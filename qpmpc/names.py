@@ -1,0 +1,121 @@
+"""Names that a user can type: shipped ones, and those that installed packages add to them."""
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
+from typing import Any
+
+from qpmpc.errors import InputError
+
+
+@dataclass(frozen=True)
+class Shipped:
+    """Where a shipped name leads, and what it needs beyond the core.
+
+    Attributes
+    ----------
+    target : ``module:attribute``, imported when the name is used
+    module, extra : package without which it cannot work, and the extra that brings it
+    settings : ``module:attribute`` of the model of its settings, if it has any of its own
+    """
+
+    target: str
+    module: str = ""
+    extra: str = ""
+    settings: str = ""
+
+
+class Names:
+    """One kind of name.
+
+    Another package adds names by entry points of the group ``qpmpc.KINDs``, for instance in its
+    pyproject.toml::
+
+        [project.entry-points."qpmpc.controllers"]
+        my-controller = "my_package.my_module:MyController"
+
+    A shipped name cannot be replaced.
+
+    Parameters
+    ----------
+    kind : what the names name, in the singular
+    shipped : the names of this package, the default first
+    also : what else a user may give, for the error message
+    """
+
+    def __init__(self, kind: str, shipped: Mapping[str, Shipped], also: str = "") -> None:
+        self.kind, self.shipped, self._also = kind, shipped, also
+
+    @cached_property
+    def added(self) -> dict[str, EntryPoint]:
+        """Entry points of other packages by name."""
+        found = sorted(entry_points(group=f"qpmpc.{self.kind}s"), key=lambda point: point.value)
+        return {point.name: point for point in found if point.name not in self.shipped}
+
+    def names(self) -> tuple[str, ...]:
+        """Return all names, the default first."""
+        return (*self.shipped, *self.added)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.shipped or name in self.added
+
+    def check(self, name: str) -> None:
+        """Check that a name is known and that the package it needs is installed.
+
+        Raises
+        ------
+        InputError
+            If it is not; the message has the known names, the nearest first.
+        """
+        if name not in self:
+            raise unknown(self.kind, name, self.names(), self._also)
+        entry = self.shipped.get(name)
+        if entry is not None and entry.module and find_spec(entry.module) is None:
+            raise InputError(
+                f"{self.kind} {name!r} needs {entry.module}: "
+                f"pip install 'qpmpc-iptm[{entry.extra}]'"
+            )
+
+    def find(self, name: str) -> Any:
+        """Import what a name stands for.
+
+        Raises
+        ------
+        InputError
+            See `check`; or if another package's entry point cannot be imported.
+        """
+        self.check(name)
+        if name in self.shipped:
+            return _load(self.shipped[name].target)
+        point = self.added[name]
+        try:
+            return point.load()
+        except Exception as error:
+            owner = point.dist.name if point.dist else "an installed package"
+            raise InputError(
+                f"{self.kind} {name!r} of {owner} cannot be loaded from {point.value}: "
+                f"{type(error).__name__}: {error}"
+            ) from error
+
+    def settings_model(self, name: str) -> Any:
+        """Return the pydantic model of what a name can be set to, None if there is none."""
+        if name in self.shipped:
+            target = self.shipped[name].settings
+            return _load(target) if target else None
+        return getattr(self.find(name), "Settings", None)
+
+
+def _load(target: str) -> Any:
+    module, _, attribute = target.partition(":")
+    return getattr(import_module(module), attribute)
+
+
+def unknown(kind: str, name: str, allowed: tuple[str, ...], also: str = "") -> InputError:
+    """Return the error of an unknown name, with the nearest known one and all others."""
+    near = difflib.get_close_matches(name, allowed, n=1)
+    hint = f", did you mean {near[0]!r}?" if near else ":"
+    return InputError(f"unknown {kind} {name!r}{hint} use one of {', '.join(allowed)}{also}")

@@ -1,0 +1,30 @@
+"""Settings of ADMM, apart from the solver itself, which takes time to load."""
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+
+
+class AdmmSettings(BaseModel):
+    """Settings of ADMM, OSQP's algorithm. Every step does the same arithmetic.
+
+    Attributes
+    ----------
+    iterations : K, iterations per step
+    cold_iterations : iterations of a solve without warm start, at departure
+    rho, proximal_weight, relaxation : step size, weight of the proximal term (sigma in OSQP's
+        paper) and over-relaxation
+    status_tolerance : on the residuals, absolute and relative, for OSQP's result to be called
+        solved; what comes of a step that is not, is used all the same
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    iterations: Annotated[int, Field(ge=1, le=100_000)] = 50
+    cold_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 4000
+    rho: Positive = 0.1
+    proximal_weight: Positive = 1e-6
+    relaxation: Annotated[float, Field(gt=0.0, lt=2.0)] = 1.6
+    status_tolerance: Annotated[float, Field(gt=0.0, lt=1.0)] = 1e-3

@@ -1,0 +1,130 @@
+"""One trip: a cycle, the vehicle that drives it, and what is known of it in advance."""
+
+import os
+from typing import NamedTuple
+
+import numpy as np
+
+from qpmpc.cycles import Cycle, load_cycle
+from qpmpc.errors import InputError
+from qpmpc.preview.forecast import Trace
+from qpmpc.vehicle import DEFAULT_VEHICLE, Plant, PlantState, Vehicle, load_vehicle
+
+
+class Observation(NamedTuple):
+    """What is measured at the start of a step; demand and speed are those of the coming second."""
+
+    step: int
+    soc: float
+    t_cl_degc: float
+    engine_on: bool
+    demand_w: float
+    speed_mps: float
+
+
+class Trip:
+    """A cycle driven by a vehicle, with a forecast of it; never changed by a run.
+
+    Parameters
+    ----------
+    cycle : a name or CSV file as `load_cycle` takes it, or a cycle
+    vehicle : a name or TOML file as `load_vehicle` takes it, or a vehicle
+    forecast : demand and speed as the long horizon sees them, or a cycle of which they are
+        computed; the truth if None. Its length may differ from the trip's.
+
+    Attributes
+    ----------
+    plant : of the vehicle
+    truth : demand, W, and mean speed, m/s, of each second
+    forecast : the same as expected in advance
+    steps : number of 1 s steps
+
+    Raises
+    ------
+    InputError
+        If a name is unknown or a file cannot be used.
+    """
+
+    def __init__(
+        self,
+        cycle: str | os.PathLike[str] | Cycle,
+        vehicle: str | os.PathLike[str] | Vehicle = DEFAULT_VEHICLE,
+        forecast: Trace | Cycle | None = None,
+    ) -> None:
+        self.cycle = cycle if isinstance(cycle, Cycle) else load_cycle(cycle)
+        self.vehicle = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle)
+        self.plant = Plant(self.vehicle)
+        self.truth = Trace.of(self.cycle, self.vehicle)
+        if isinstance(forecast, Cycle):
+            forecast = Trace.of(forecast, self.vehicle)
+        self.forecast = self.truth if forecast is None else forecast
+        self._demand_w: list[float] = self.truth.demand_w.tolist()
+        self._speed_mps: list[float] = self.truth.speed_mps.tolist()
+
+    @property
+    def steps(self) -> int:
+        """Number of 1 s steps."""
+        return len(self._demand_w)
+
+    def observation(self, step: int, state: PlantState) -> Observation:
+        """Return what a controller is shown at the start of a step.
+
+        Parameters
+        ----------
+        step : 0 .. steps - 1
+        state : of the plant, measured without error
+        """
+        return Observation(
+            step,
+            state.soc,
+            state.t_cl_degc,
+            state.engine_on,
+            self._demand_w[step],
+            self._speed_mps[step],
+        )
+
+    @property
+    def start(self) -> Observation:
+        """Observation at departure."""
+        return self.observation(0, self.plant.initial_state())
+
+    def with_forecast(self, forecast: Trace | Cycle | None) -> "Trip":
+        """Return the same trip with another forecast; the truth if None."""
+        return Trip(self.cycle, self.vehicle, forecast)
+
+    def same_as(self, other: "Trip") -> bool:
+        """Whether cycle, vehicle and forecast are equal number by number."""
+        if self is other:
+            return True
+        return (
+            self.cycle.name == other.cycle.name
+            and self.vehicle == other.vehicle
+            and _equal(self.truth, other.truth)
+            and _equal(self.forecast, other.forecast)
+        )
+
+    def __repr__(self) -> str:
+        return f"Trip({self.cycle.name!r}, {self.vehicle.name!r}, {self.steps} s)"
+
+
+def _equal(a: Trace, b: Trace) -> bool:
+    return np.array_equal(a.demand_w, b.demand_w) and np.array_equal(a.speed_mps, b.speed_mps)
+
+
+def as_trip(
+    cycle: str | os.PathLike[str] | Cycle | Trip,
+    vehicle: str | os.PathLike[str] | Vehicle | None,
+    forecast: Trace | Cycle | None,
+) -> Trip:
+    """Return the trip of what a user gave; a trip itself stays as it is.
+
+    Raises
+    ------
+    InputError
+        If a vehicle or a forecast is given beside a trip, which has its own; see `Trip`.
+    """
+    if not isinstance(cycle, Trip):
+        return Trip(cycle, DEFAULT_VEHICLE if vehicle is None else vehicle, forecast)
+    if vehicle is not None or forecast is not None:
+        raise InputError("a Trip has its vehicle and its forecast: give them to Trip(...)")
+    return cycle

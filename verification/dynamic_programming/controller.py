@@ -1,0 +1,31 @@
+"""Dynamic programming as a controller: its plan, replayed on the plant."""
+
+from collections.abc import Callable, Sequence
+
+from qpmpc.controllers.base import Progress
+from qpmpc.controllers.replay import Replay
+from qpmpc.vehicle.plant import Command
+from qpmpc.verification.dynamic_programming.settings import DpSettings
+from qpmpc.verification.dynamic_programming.solve_dp import solve_dp
+
+PARTS = 1000  # of the progress
+
+
+class Dp(Replay):
+    """The optimum of the trip: knows the whole cycle and the plant."""
+
+    name = "dp"
+    Settings = DpSettings
+
+    def commands(self, progress: Progress | None) -> Sequence[Command]:
+        """Solve the trip, or take its solution from the cache."""
+        grid = self.settings.of("dp", DpSettings())
+        report = None if progress is None else as_fraction(progress)
+        plan = solve_dp(self.trip.cycle, self.trip.vehicle, grid, report)
+        pairs = zip(plan.engine_on.tolist(), plan.p_eng_w.tolist(), strict=True)
+        return [Command(on, p_eng_w) for on, p_eng_w in pairs]
+
+
+def as_fraction(progress: Progress) -> Callable[[float], None]:
+    """Turn a progress that counts parts into one that takes the finished fraction."""
+    return lambda fraction: progress(round(fraction * PARTS), PARTS)
