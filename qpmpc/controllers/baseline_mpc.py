@@ -29,7 +29,7 @@ class BaselineMpcSettings(BaseModel):
     pwa, scaling, osqp : as in `mh-qp`
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     horizon_s: Annotated[int, Field(ge=1, le=2000)] = 20
     qp: QpSettings = QpSettings(soc_penalty_g=30e3)

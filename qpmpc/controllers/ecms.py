@@ -32,7 +32,7 @@ class EcmsSettings(BaseModel):
     power_step_w : spacing of the engine powers compared
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     factor: Factor = 2.7
     factor_per_soc: NotNegative = 10.0

@@ -27,7 +27,7 @@ PAPER = MhQpSettings(
 class ControllerSettings(BaseModel):
     """Settings of every controller; the first part of a dotted name picks the controller."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     rule_based: RuleBasedSettings = RuleBasedSettings()
     mh_qp: MhQpSettings = MhQpSettings()

@@ -35,7 +35,7 @@ class MhQpSettings(BaseModel):
         while the solver warms up
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     horizon: HorizonSettings = HorizonSettings()
     pwa: PwaTolerances = PwaTolerances()

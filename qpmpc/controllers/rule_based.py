@@ -28,7 +28,7 @@ class RuleBasedSettings(BaseModel):
     soc_forced : forced on below this SOC
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     k_soc_w: Watts = 100e3
     balance: bool = True

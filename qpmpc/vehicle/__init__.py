@@ -1,7 +1,8 @@
 """Vehicle: parameters, nonlinear maps, power demand and the plant."""
 
 from qpmpc.vehicle.demand import demand_w
-from qpmpc.vehicle.parameters import DEFAULT_VEHICLE, Vehicle, load_vehicle, vehicle_names
+from qpmpc.vehicle.load import DEFAULT_VEHICLE, load_vehicle, vehicle_names
+from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.plant import Command, Plant, PlantState, StepFlows
 
 __all__ = [
