@@ -4,6 +4,7 @@ from qpmpc.vehicle.demand import demand_w
 from qpmpc.vehicle.load import DEFAULT_VEHICLE, load_vehicle, vehicle_names
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.plant import Command, Plant, PlantState, StepFlows
+from qpmpc.vehicle.toml_text import vehicle_file_text, vehicle_toml
 
 __all__ = [
     "DEFAULT_VEHICLE",
@@ -14,5 +15,7 @@ __all__ = [
     "Vehicle",
     "demand_w",
     "load_vehicle",
+    "vehicle_file_text",
     "vehicle_names",
+    "vehicle_toml",
 ]
