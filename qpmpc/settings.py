@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, TypeVar
 
+import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from qpmpc.errors import InputError
@@ -101,7 +102,8 @@ def apply_settings(data: dict[str, Any], settings: dict[str, object], owner: str
             place = inner
         if last not in place or isinstance(place[last], dict):
             raise _unknown(dotted, last, place, owner)
-        place[last] = value
+        # numpy's numbers and arrays count as Python's, which strict models ask for
+        place[last] = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
     return result
 
 

@@ -5,6 +5,7 @@ import re
 import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from qpmpc.vehicle.load import VehicleFile, merged_vehicle, origins, vehicle_files
 from qpmpc.vehicle.parameters import Vehicle
@@ -24,7 +25,7 @@ class Comment:
     beside: str = ""
 
 
-def vehicle_file_text(name_or_path: str) -> str:
+def vehicle_file_text(name_or_path: str | Path) -> str:
     """Return a vehicle's file; if it has a base, one file that needs none, with all comments.
 
     Raises

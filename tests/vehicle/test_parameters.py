@@ -122,6 +122,15 @@ def test_whole_numbers_and_those_of_numpy_are_numbers():
         warm = load_vehicle().with_settings({"thermal.t_amb_degc": number})
         assert type(warm.thermal.t_amb_degc) is float
         assert warm.thermal.t_amb_degc == 25.0
+    with pytest.raises(InputError, match="given: true"):
+        load_vehicle().with_settings({"thermal.t_amb_degc": np.bool_(True)})
+    fewer = ControllerSettings().with_settings({"mh_qp.osqp.iterations": np.int64(25)})
+    assert fewer.mh_qp.osqp.iterations == 25
+    resistance = 0.5 * np.array(load_vehicle("prius-liion").battery.resistance_charge_ohm)
+    better = load_vehicle("prius-liion").with_settings(
+        {"battery.resistance_charge_ohm": resistance}
+    )
+    assert better.battery.resistance_charge_ohm == tuple(resistance)
 
 
 def test_settings_of_controllers_are_as_strict():
