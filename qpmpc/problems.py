@@ -9,7 +9,6 @@ from pydantic_core import ErrorDetails
 
 SHOWN = 8  # problems of one sort; a file with more is not the one that was meant
 LONGEST = 60  # characters of a key or value that are repeated
-HUGE = 10**18  # whole numbers from here on are not repeated
 
 # pydantic's messages about Python's types, in the words of a TOML file
 _WORDS = {
@@ -57,7 +56,10 @@ def problems_line(
 
 def shown_value(value: object) -> str:
     """Return a value as a TOML file has it, cut where it is long."""
-    return _cut(str(value).lower() if isinstance(value, bool) else repr(value))
+    try:
+        return _cut(str(value).lower() if isinstance(value, bool) else repr(value))
+    except ValueError:  # Python writes no whole number of more than some thousand digits
+        return "a number too long to show"
 
 
 def _wrong(each: ErrorDetails, key: str, owner: str, origins: Mapping[str, str]) -> str:
@@ -65,7 +67,7 @@ def _wrong(each: ErrorDetails, key: str, owner: str, origins: Mapping[str, str])
     if each["type"] in _WORDS:
         text = _WORDS[each["type"]].format(**each.get("ctx", {}))
     given = each["input"]
-    if isinstance(given, str | float) or (isinstance(given, int) and abs(given) < HUGE):
+    if isinstance(given, str | float | int):
         text += f" (given: {shown_value(given)})"
     # A check of several keys together names them in its message: each may stand elsewhere.
     prefix = f"{key}." if key else ""

@@ -102,6 +102,7 @@ def test_an_array_alone_must_fit_those_of_the_base(write):
         ('"latin.toml"', ["latin.toml: not a UTF-8 text file"]),
         ('"broken.toml"', ["broken.toml: not valid TOML"]),
         ("3", ["mine.toml: base must be the name", "(given: 3)"]),
+        (f"0x{'f' * 9000}", ["mine.toml: base must be the name", "number too long"]),
         ("[]", ["mine.toml: base must be the name"]),
         ("false", ["mine.toml: base must be the name", "(given: false)"]),
     ],
