@@ -9,7 +9,8 @@ from qpmpc.cycles.breakpoints import read_breakpoints
 from qpmpc.cycles.catalogue import CatalogueEntry, catalogue
 from qpmpc.cycles.cycle import Cycle
 from qpmpc.cycles.read_csv import read_csv
-from qpmpc.names import Names, Shipped, unknown
+from qpmpc.errors import InputError
+from qpmpc.names import Names, Shipped
 
 # an added name leads to a Cycle, or to the path of a CSV file
 CYCLES = Names(
@@ -44,7 +45,7 @@ def load_cycle(name_or_path: str | os.PathLike[str]) -> Cycle:
     path = Path(name)
     # os.path: unlike Path.exists it does not raise on an impossible name
     if path.suffix == "" and path.name == name and not os.path.exists(name):  # noqa: PTH110
-        raise unknown("cycle", name, CYCLES.names(), ", or a CSV file")
+        raise InputError(CYCLES.unknown(name))
     return read_csv(path)
 
 

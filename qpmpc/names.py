@@ -72,7 +72,7 @@ class Names:
             If it is not; the message has the known names, the nearest first.
         """
         if name not in self:
-            raise unknown(self.kind, name, self.names(), self._also)
+            raise InputError(self.unknown(name))
         entry = self.shipped.get(name)
         if entry is not None and entry.module and find_spec(entry.module) is None:
             raise InputError(
@@ -101,6 +101,10 @@ class Names:
                 f"{type(error).__name__}: {error}"
             ) from error
 
+    def unknown(self, name: str) -> str:
+        """Return what to say of a name that is not known."""
+        return unknown(self.kind, name, self.names(), self._also)
+
     def settings_model(self, name: str) -> Any:
         """Return the pydantic model of what a name can be set to, None if there is none."""
         if name in self.shipped:
@@ -114,8 +118,8 @@ def _load(target: str) -> Any:
     return getattr(import_module(module), attribute)
 
 
-def unknown(kind: str, name: str, allowed: tuple[str, ...], also: str = "") -> InputError:
-    """Return the error of an unknown name, with the nearest known one and all others."""
+def unknown(kind: str, name: str, allowed: tuple[str, ...], also: str = "") -> str:
+    """Return what to say of an unknown name: the nearest known one and all others."""
     near = difflib.get_close_matches(name, allowed, n=1)
     hint = f", did you mean {near[0]!r}?" if near else ":"
-    return InputError(f"unknown {kind} {name!r}{hint} use one of {', '.join(allowed)}{also}")
+    return f"unknown {kind} {name!r}{hint} use one of {', '.join(allowed)}{also}"

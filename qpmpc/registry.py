@@ -120,7 +120,7 @@ def _table_of(name: str) -> Names:
     for table in (CONTROLLERS, PLANNERS):
         if name in table:
             return table
-    raise unknown("controller", name, controller_names())
+    raise InputError(unknown("controller", name, controller_names()))
 
 
 def split_settings(

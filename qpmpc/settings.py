@@ -1,11 +1,15 @@
 """Reading and checking parameters: TOML text, dotted overrides, one-line errors."""
 
 import tomllib
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, TypeVar
 
+import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from qpmpc.errors import InputError
+from qpmpc.problems import problems_line
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -20,29 +24,34 @@ def load_toml(text: str, owner: str) -> dict[str, Any]:
     """
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    # Besides its own error the parser lets through those of numbers with thousands of digits and
+    # of arrays nested as deep.
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{owner}: not valid TOML: {error}") from error
 
 
-def validated(model: type[Model], data: dict[str, Any], owner: str) -> Model:
-    """Build `model` from `data`; `owner` names the data in the error.
+def validated(
+    model: type[Model],
+    data: dict[str, Any],
+    owner: str,
+    origins: Mapping[str, str] = MappingProxyType({}),
+) -> Model:
+    """Build `model` from `data`.
+
+    Parameters
+    ----------
+    owner : names the data in the error
+    origins : dotted key -> the file it stands in, for keys that are not the owner's own
 
     Raises
     ------
     InputError
-        One line naming the first wrong key, its value and what is allowed.
+        One line naming every missing key, unknown key and wrong value.
     """
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        found = error.errors()
-        # A misspelt key is both an extra one and a missing one: name what the user wrote.
-        first = next((e for e in found if e["type"] == "extra_forbidden"), found[0])
-        key = ".".join(str(part) for part in first["loc"])
-        problem = first["msg"].removeprefix("Value error, ")
-        given = first["input"]
-        shown = f" (given: {given!r})" if isinstance(given, int | float | str) else ""
-        raise InputError(f"{owner}: {key + ': ' if key else ''}{problem}{shown}") from error
+        raise InputError(problems_line(error, model, owner, origins)) from error
 
 
 def parse_setting(text: str) -> tuple[str, object]:
@@ -59,7 +68,7 @@ def parse_setting(text: str) -> tuple[str, object]:
         raise InputError(f"--set {text!r}: expected KEY=VALUE, e.g. thermal.t_amb_degc=-15")
     try:
         return key, tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         return key, value
 
 
@@ -93,7 +102,8 @@ def apply_settings(data: dict[str, Any], settings: dict[str, object], owner: str
             place = inner
         if last not in place or isinstance(place[last], dict):
             raise _unknown(dotted, last, place, owner)
-        place[last] = value
+        # numpy's numbers and arrays count as Python's, which strict models ask for
+        place[last] = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
     return result
 
 

@@ -12,6 +12,7 @@ import typer
 
 from qpmpc.cli import main
 from qpmpc.cli.app import app
+from qpmpc.vehicle import load_vehicle
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -62,6 +63,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     car = files("qpmpc.vehicle").joinpath("data", "prius-liion.toml").read_text("utf-8")
     (tmp_path / "my_car.toml").write_text(car.replace("prius-liion", "my-car"))
+    for _, text in blocks("toml"):
+        name = text.splitlines()[0].removeprefix("# ")
+        (tmp_path / name).write_text(text, "utf-8")
     speeds = [0, 2, 5, 8, 11, 13, 14, 14, 14, 14, 14, 12, 9, 6, 3, 0]
     rows = "".join(f"{3 * i},{speed}\n" for i, speed in enumerate(speeds))
     (tmp_path / "my_trip.csv").write_text("time_s,speed_mps\n" + rows)
@@ -91,6 +95,20 @@ def test_example_in_the_help_is_understood(command):
     """Parsed, not run: options and arguments exist and have the right types."""
     name, *args = shlex.split(command, comments=True)[1:]
     typer.main.get_command(app).commands[name].make_context(name, args)
+
+
+def test_the_documented_vehicle_is_its_base_with_what_differs(folder):
+    differs = {"name": "my-van", "chassis.mass_kg": 2100, "chassis.road_load_c_n_per_mps2": 0.45}
+    differs["battery.capacity_ah"] = 9
+    assert load_vehicle("my_van.toml") == load_vehicle("prius-nimh").with_settings(differs)
+
+
+def test_a_wrong_vehicle_file_is_met_with_the_documented_line(folder, capsys):
+    van = Path("my_van.toml").read_text("utf-8")
+    Path("my_van.toml").write_text(van.replace("name =", "# name =").replace("mass_kg", "mas_kg"))
+    with pytest.raises(SystemExit):
+        main(["vehicles", "my_van.toml"])
+    assert f"\n    {capsys.readouterr().err}" in (ROOT / "docs" / "cli.md").read_text("utf-8")
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,8 @@ VehicleOption = Annotated[
     typer.Option(
         "--vehicle",
         metavar="NAME|FILE.toml",
-        help="A shipped vehicle (see [b]qpmpc vehicles[/b]) or a TOML file with the same keys.",
+        help="A shipped vehicle (see [b]qpmpc vehicles[/b]) or a TOML file, "
+        "complete or with a base.",
     ),
 ]
 SetOption = Annotated[

@@ -20,25 +20,41 @@ def vehicles(
             metavar="NAME|FILE.toml", help="Show the parameters of this one.", show_default=False
         ),
     ] = None,
+    toml: Annotated[
+        bool,
+        typer.Option("--toml", help="Print its TOML file, any base merged in, and nothing else."),
+    ] = False,
     out: OutOption = None,
 ) -> None:
     """List the shipped vehicles, or show the parameters of one and its piecewise-affine models.
 
     With --out: a picture of the piecewise-affine fits and their errors.
+    With --toml: a file to start a vehicle of your own from.
 
     For example:
 
       qpmpc vehicles
 
       qpmpc vehicles prius-nimh --out results
+
+      qpmpc vehicles prius-liion --toml
     """
     from qpmpc.cli.console import result_console
     from qpmpc.cli.inputs import check_outputs
     from qpmpc.errors import InputError
     from qpmpc.report.pwa_curves import pwa_curves
     from qpmpc.report.write import write_pwa
-    from qpmpc.vehicle import load_vehicle, vehicle_names
+    from qpmpc.vehicle import load_vehicle, vehicle_file_text, vehicle_names
 
+    if toml:
+        if name is None or out is not None:
+            raise InputError(
+                "--toml prints the file of one vehicle and draws nothing: name it and leave out "
+                "--out, e.g. qpmpc vehicles prius-nimh --toml"
+            )
+        # as bytes, since TOML is UTF-8 whatever the terminal uses
+        typer.echo(vehicle_file_text(name).encode(), nl=False)
+        return
     if name is None and out is not None:
         raise InputError(
             "--out draws one vehicle: name it, e.g. qpmpc vehicles prius-nimh --out results"

@@ -36,7 +36,7 @@ class RuleBasedSettings(BaseModel):
     soc_forced : forced on below this SOC
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     k_soc_w: Watts = 100e3
     balance: bool = True
@@ -65,7 +65,7 @@ class MhQpSettings(BaseModel):
         while the solver warms up
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     horizon: HorizonSettings = HorizonSettings()
     pwa: PwaTolerances = PwaTolerances()
@@ -97,7 +97,7 @@ class BaselineMpcSettings(BaseModel):
     pwa, scaling, admm : as in `mh-qp`
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     horizon_s: Annotated[int, Field(ge=1, le=2000)] = 20
     qp: QpSettings = QpSettings(soc_penalty_g=30e3)
@@ -134,7 +134,7 @@ class EcmsSettings(BaseModel):
     power_step_w : spacing of the engine powers compared
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     factor: Factor = 2.7
     factor_per_soc: NotNegative = 10.0
@@ -154,7 +154,7 @@ class ControllerSettings(BaseModel):
     others : what was set of sections that other packages own, by section and dotted name
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     rule_based: RuleBasedSettings = RuleBasedSettings()
     mh_qp: MhQpSettings = MhQpSettings()

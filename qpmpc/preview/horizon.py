@@ -18,7 +18,7 @@ class HorizonSettings(BaseModel):
     class_hard_w, class_braking_w : demand above the first is hard, below the second braking
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     short_stages: Annotated[int, Field(ge=1, le=2000)] = 20
     blocks: Annotated[int, Field(ge=0, le=500)] = 7

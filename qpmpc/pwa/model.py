@@ -30,7 +30,7 @@ class PwaTolerances(BaseModel):
     alpha : cold multiplier
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     fuel_g_per_s: Tolerance = 0.0015
     fuel_knee_w: Tolerance = 20e3

@@ -22,7 +22,7 @@ class ScalingSettings(BaseModel):
         variables, which weigh more, are resolved finer; 1 makes them energies, 0 plain rates
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     power_w: Positive = 10e3
     fuel_g_per_s: Positive = 1.0

@@ -40,7 +40,7 @@ class QpSettings(BaseModel):
     regularisation : quadratic cost on rates and slack in solver units, far below any fuel
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     terminal_low: Annotated[float, Field(gt=0.0, le=1.5)] = 1.0
     terminal_high: Annotated[float, Field(gt=0.0, le=1.5)] = 1.01

@@ -20,7 +20,7 @@ class AdmmSettings(BaseModel):
         solved; what comes of a step that is not, is used all the same
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     iterations: Annotated[int, Field(ge=1, le=100_000)] = 50
     cold_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 4000

@@ -1,35 +1,46 @@
 """Vehicle parameters: validated, immutable, units in every name.
 
-A vehicle is a TOML file with the sections below. Two are shipped; any other file with the same
-keys works as well. ``Vehicle.with_settings`` applies dotted overrides such as
+A vehicle is a TOML file with the sections below, or one with a base and what differs from it
+(`qpmpc.vehicle.load`). ``Vehicle.with_settings`` applies dotted overrides such as
 ``thermal.t_amb_degc=-15``.
 """
 
-import os
-from importlib import resources
+import re
 from itertools import pairwise
-from pathlib import Path
 from typing import Annotated, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from qpmpc.errors import InputError
-from qpmpc.names import unknown
-from qpmpc.settings import apply_settings, load_toml, validated
-from qpmpc.vehicle.names import DEFAULT_VEHICLE, VEHICLES
+from qpmpc.settings import apply_settings, validated
 
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-Share = Annotated[float, Field(gt=0.0, lt=1.0, allow_inf_nan=False)]
-Celsius = Annotated[float, Field(ge=-100.0, le=150.0, allow_inf_nan=False)]
-Table = Annotated[tuple[Positive, ...], Field(min_length=2)]
+
+def _check_name(name: str) -> str:
+    """Names become parts of file names and of comments in C."""
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", name):
+        raise ValueError(
+            "must begin with a letter or digit and have at most 64 letters, digits, '.', '_', '-'"
+        )
+    return name
+
+
+Name = Annotated[str, AfterValidator(_check_name)]
+Positive = Annotated[float, Field(gt=0.0)]
+NonNegative = Annotated[float, Field(ge=0.0)]
+Share = Annotated[float, Field(gt=0.0, lt=1.0)]
+Celsius = Annotated[float, Field(ge=-100.0, le=150.0)]
+# Not strict: TOML's arrays are lists. Their entries are.
+Grid = Annotated[tuple[float, ...], Field(min_length=2, strict=False)]
+Table = Annotated[tuple[Positive, ...], Field(min_length=2, strict=False)]
 
 
 class Section(BaseModel):
-    """A group of parameters; unknown keys are errors, values cannot change after loading."""
+    """A group of parameters: no unknown keys, only finite numbers, no change after loading.
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    Strict: without it pydantic takes true for 1 and "2" for 2.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
 def _require_increasing(name: str, values: tuple[float, ...]) -> None:
@@ -127,7 +138,7 @@ class Battery(Section):
     """Open-circuit voltage and resistances over SOC, power and SOC limits, auxiliary load."""
 
     capacity_ah: Positive
-    soc_grid: Annotated[tuple[float, ...], Field(min_length=2)]
+    soc_grid: Grid
     open_circuit_v: Table
     resistance_discharge_ohm: Table
     resistance_charge_ohm: Table
@@ -174,7 +185,7 @@ class Trip(Section):
 class Vehicle(Section):
     """All parameters of the plant."""
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Name
     description: str = ""
     chassis: Chassis
     engine: Engine
@@ -203,34 +214,3 @@ class Vehicle(Section):
             return self
         data = apply_settings(self.model_dump(), settings, owner=f"vehicle {self.name}")
         return validated(Vehicle, data, f"vehicle {self.name}")
-
-
-def vehicle_names() -> tuple[str, ...]:
-    """Return the names of the shipped vehicles, the default first."""
-    return tuple(VEHICLES.shipped)
-
-
-def load_vehicle(name_or_path: str | os.PathLike[str] = DEFAULT_VEHICLE) -> Vehicle:
-    """Load a shipped vehicle by name, or any vehicle from a TOML file.
-
-    Raises
-    ------
-    InputError
-        If the name is unknown, the file cannot be read, or a key or value is not allowed.
-    """
-    text = os.fspath(name_or_path)
-    if text in vehicle_names():
-        source = resources.files("qpmpc.vehicle") / "data" / f"{text}.toml"
-        return validated(Vehicle, load_toml(source.read_text("utf-8"), text), f"vehicle {text}")
-    if text in VEHICLES:
-        found = VEHICLES.find(text)
-        return found if isinstance(found, Vehicle) else load_vehicle(Path(found))
-    path = Path(name_or_path)
-    if path.suffix != ".toml":
-        raise unknown("vehicle", text, VEHICLES.names(), ", or a .toml file")
-    try:
-        content = path.read_text("utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not a UTF-8 text file"
-        raise InputError(f"cannot read vehicle file {text}: {reason}") from error
-    return validated(Vehicle, load_toml(content, text), text)

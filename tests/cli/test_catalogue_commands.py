@@ -1,6 +1,12 @@
 """The commands that show what is shipped."""
 
+import os
 import re
+import subprocess
+import sys
+import tomllib
+
+import pytest
 
 from qpmpc.cycles import catalogue, cycle_names, load_cycle
 from qpmpc.pwa.model import PwaModel
@@ -64,3 +70,33 @@ def test_vehicles_name_shows_the_piecewise_affine_models(cli, tmp_path):
         assert f"{fit.below / unit:.3g}" in line
         assert f"{fit.above / unit:.3g}" in line
     assert (tmp_path / "pwa_prius-nimh.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("name", vehicle_names())
+def test_vehicles_toml_is_the_whole_of_stdout(cli, tmp_path, name):
+    done = cli("vehicles", name, "--toml")
+    assert (done.code, done.err) == (0, "")
+    file = tmp_path / "copy.toml"
+    file.write_text(done.out, "utf-8")
+    assert load_vehicle(file) == load_vehicle(name)
+    assert cli("vehicles", file, "--toml").out == done.out  # complete: it is printed as it is
+
+
+def test_vehicles_toml_takes_a_users_file(cli, tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text('base = "prius-liion"\nname = "mine"\ndescription = "Größe"\n', "utf-8")
+    merged = tomllib.loads(cli("vehicles", file, "--toml").out)
+    assert (merged["name"], merged["description"]) == ("mine", "Größe")
+    assert merged["battery"]["capacity_ah"] == load_vehicle("prius-liion").battery.capacity_ah
+
+
+def test_vehicles_toml_is_utf8_whatever_the_terminal_uses(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text('base = "prius-nimh"\nname = "mine"\ndescription = "Größe"\n', "utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "qpmpc", "vehicles", file, "--toml"],
+        capture_output=True,
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+    )
+    assert done.returncode == 0
+    assert tomllib.loads(done.stdout.decode())["description"] == "Größe"

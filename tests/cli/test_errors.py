@@ -49,6 +49,12 @@ def files(folder: Path) -> dict[str, bytes]:
         (["cycles", "--out", "."], ["--out", "name"]),
         (["vehicles", "nonsense"], ["nonsense", "prius-nimh"]),
         (["vehicles", "nycc", "--out", "file"], ["file"]),
+        (["vehicles", "--toml"], ["--toml", "name"]),
+        (["vehicles", "prius-nimh", "--toml", "--out", "out"], ["--toml", "--out"]),
+        (["vehicles", "nonsense", "--toml"], ["nonsense", "prius-nimh"]),
+        (["vehicles", "missing.toml", "--toml"], ["missing.toml"]),
+        (["simulate", "nycc", "--set", "thermal.t_amb_degc=true"], ["t_amb_degc", "true"]),
+        (["simulate", "nycc", "--set", "mh_qp.osqp.iterations=true"], ["iterations", "true"]),
     ],
 )
 def test_bad_input_is_one_line_and_nothing_is_written(cli, tmp_path, monkeypatch, args, words):
@@ -77,7 +83,10 @@ def test_bad_trip(cli, tmp_path, rows):
 def test_bad_vehicle_file(cli, trip, tmp_path):
     file = tmp_path / "car.toml"
     file.write_text("name = 'x'\n")
-    cli("simulate", trip, "--vehicle", file).assert_refused("car.toml", "chassis")
+    cli("simulate", trip, "--vehicle", file).assert_refused("car.toml", "chassis", "[trip]")
+    cli("vehicles", file, "--toml").assert_refused("car.toml", "chassis")
+    file.write_text("base = 'car.toml'\nname = 'x'\n")
+    cli("simulate", trip, "--vehicle", file).assert_refused("car.toml", "circle")
     file.write_text("name = = 'x'\n")
     cli("simulate", trip, "--vehicle", file).assert_refused("car.toml", "TOML")
 

@@ -1,12 +1,19 @@
 """Vehicle files: shipped ones load, bad ones get one clear line."""
 
+import math
 from importlib import resources
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import BaseModel
 
+from qpmpc.controllers.factory import ControllerSettings
 from qpmpc.errors import InputError
 from qpmpc.settings import parse_setting, parse_settings
-from qpmpc.vehicle import load_vehicle, vehicle_names
+from qpmpc.vehicle import Vehicle, load_vehicle, vehicle_names
+from qpmpc.verification.nonlinear.mh_nlp import MhNlpSettings
 
 
 def _text() -> str:
@@ -36,6 +43,9 @@ def test_a_vehicle_file_loads_like_the_shipped_one(tmp_path):
         ("power_discharge_max_w = 27000.0", "power_discharge_max_w = 60000.0", "power_discharge"),
         ("torque_speed_rpm = [1000,", "torque_speed_rpm = [9000,", "torque_speed_rpm"),
         ("[chassis]", "[chassis", "TOML"),
+        ("mass_kg = 1530.9", f"mass_kg = {'9' * 5000}", "TOML"),
+        ("mass_kg = 1530.9", f"mass_kg = {'[' * 5000}", "TOML"),
+        ("mass_kg = 1530.9", f"mass_kg = 0x{'f' * 5000}", "chassis.mass_kg"),
     ],
 )
 def test_bad_values_are_named_in_one_line(tmp_path, old, new, named):
@@ -71,3 +81,95 @@ def test_settings_texts():
     for text in ("a.b", "=1", "a.b="):
         with pytest.raises(InputError, match="KEY=VALUE"):
             parse_setting(text)
+
+
+NUMBERS = [
+    (section, key)
+    for section, values in load_vehicle().model_dump(exclude={"name", "description"}).items()
+    for key, value in values.items()
+    if isinstance(value, float)
+]
+TABLES = [
+    (section, key)
+    for section, values in load_vehicle().model_dump(exclude={"name", "description"}).items()
+    for key, value in values.items()
+    if isinstance(value, tuple)
+]
+NOT_NUMBERS = [True, False, "1", "nan", math.nan, math.inf, -math.inf, None, [1.0], 10**400]
+
+
+@pytest.mark.parametrize(("section", "key"), NUMBERS)
+def test_only_finite_numbers_are_numbers(section, key):
+    """Without strictness pydantic takes True for 1 and "1" for 1."""
+    for wrong in NOT_NUMBERS:
+        with pytest.raises(InputError, match=f"{section}.{key}"):
+            load_vehicle().with_settings({f"{section}.{key}": wrong})
+
+
+@pytest.mark.parametrize(("section", "key"), TABLES)
+def test_only_finite_numbers_are_entries(section, key):
+    values = list(load_vehicle().model_dump()[section][key])
+    for wrong in NOT_NUMBERS:
+        with pytest.raises(InputError, match=rf"{section}.{key}\[1\]: must be"):
+            load_vehicle().with_settings({f"{section}.{key}": [values[0], wrong, *values[2:]]})
+    for wrong in (True, 1.0, "1, 2", [1.0]):
+        with pytest.raises(InputError, match=f"{section}.{key}: must"):
+            load_vehicle().with_settings({f"{section}.{key}": wrong})
+
+
+def test_whole_numbers_and_those_of_numpy_are_numbers():
+    for number in (25, 25.0, np.float64(25.0), np.float32(25.0), np.int64(25)):
+        warm = load_vehicle().with_settings({"thermal.t_amb_degc": number})
+        assert type(warm.thermal.t_amb_degc) is float
+        assert warm.thermal.t_amb_degc == 25.0
+    with pytest.raises(InputError, match="given: true"):
+        load_vehicle().with_settings({"thermal.t_amb_degc": np.bool_(True)})
+    fewer = ControllerSettings().with_settings({"mh_qp.osqp.iterations": np.int64(25)})
+    assert fewer.mh_qp.osqp.iterations == 25
+    resistance = 0.5 * np.array(load_vehicle("prius-liion").battery.resistance_charge_ohm)
+    better = load_vehicle("prius-liion").with_settings(
+        {"battery.resistance_charge_ohm": resistance}
+    )
+    assert better.battery.resistance_charge_ohm == tuple(resistance)
+
+
+def test_settings_of_controllers_are_as_strict():
+    for key, wrong in [
+        ("mh_qp.osqp.iterations", True),
+        ("mh_qp.osqp.rho", True),
+        ("mh_qp.osqp.rho", "0.1"),
+        ("mh_qp.horizon.class_hard_w", math.inf),
+        ("mh_qp.prepared", 1),
+        ("rule_based.heat_on_degc", math.nan),
+    ]:
+        with pytest.raises(InputError, match=key):
+            ControllerSettings().with_settings({key: wrong})
+
+
+def test_every_table_of_settings_is_strict():
+    seen, waiting = set(), [Vehicle, ControllerSettings, MhNlpSettings]
+    while waiting:
+        model = waiting.pop()
+        seen.add(model)
+        config = model.model_config
+        for key, value in {"frozen": True, "extra": "forbid", "strict": True}.items():
+            assert config.get(key) == value, model
+        assert config.get("allow_inf_nan") is False, model
+        kinds = [field.annotation for field in model.model_fields.values()]
+        waiting += [k for k in kinds if isinstance(k, type) and issubclass(k, BaseModel)]
+    assert len(seen) >= 15
+
+
+@given(name=st.from_regex(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", fullmatch=True))
+def test_names_that_are_allowed(name):
+    assert load_vehicle().with_settings({"name": name}).name == name
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["", " ", "a b", "a/b", "../x", ".x", "-x", "_x", "x\n", "x\0", "Größe", "a" * 65, 3, True],
+)
+def test_names_that_are_not(name):
+    with pytest.raises(InputError, match="name: must") as caught:
+        load_vehicle().with_settings({"name": name})
+    assert "\n" not in str(caught.value)

@@ -23,7 +23,7 @@ class DpSettings(BaseModel):
     threads : processor cores to use, all that are allowed if None; does not change the result
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     soc_step: Annotated[Step, Field(le=0.1)] = 0.002
     t_cl_step_k: Annotated[Step, Field(le=10.0)] = 0.5

@@ -29,7 +29,7 @@ class MhNlpSettings(BaseModel):
     on_off_prices_g : the prices, g
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     horizon: HorizonSettings = HorizonSettings()
     qp: QpSettings = QpSettings()

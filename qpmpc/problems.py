@@ -1,0 +1,138 @@
+"""Everything that is wrong with a set of parameters, in one line of bounded length."""
+
+import re
+from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+SHOWN = 8  # problems of one sort; a file with more is not the one that was meant
+LONGEST = 60  # characters of a key or value that are repeated
+
+# pydantic's messages about Python's types, in the words of a TOML file
+_WORDS = {
+    "model_type": "must be a table",
+    "dict_type": "must be a table",
+    "tuple_type": "must be an array",
+    "too_short": "must have at least {min_length} entries",
+}
+
+
+def problems_line(
+    error: ValidationError, model: type[BaseModel], owner: str, origins: Mapping[str, str]
+) -> str:
+    """Say what is missing, what is unknown and which values are wrong.
+
+    For example ``my.toml: missing battery.soc_min; unknown chassis.mas_kg (did you mean
+    chassis.mass_kg?); trip.eta_eq: must be less than 1 (given: 2)``.
+
+    Parameters
+    ----------
+    error : of `model`
+    owner : the file or thing that the line begins with
+    origins : dotted key -> the file it stands in; said where that is not the owner
+    """
+    found = error.errors()
+    places = [each["loc"] for each in found]
+    missing, unknown, wrong = [], [], []
+    for each in found:
+        key = _dotted(each["loc"])
+        if each["type"] == "missing":
+            missing.append(f"[{key}]" if _model_at(model, each["loc"]) else key)
+        elif each["type"] == "extra_forbidden":
+            unknown.append(key + _origin(key, owner, origins) + _suggestion(model, each["loc"]))
+        elif each["type"] != "too_short" or not _has_wrong_entries(each["loc"], places):
+            wrong.append(_wrong(each, key, owner, origins))
+    parts = []
+    if missing:
+        parts.append(f"missing {_bounded(missing, ', ')}")
+    if unknown:
+        parts.append(f"unknown {_bounded(unknown, ', ')}")
+    if wrong:
+        parts.append(_bounded(wrong, "; "))
+    return f"{owner}: {'; '.join(parts)}"
+
+
+def shown_value(value: object) -> str:
+    """Return a value as a TOML file has it, cut where it is long."""
+    try:
+        return _cut(str(value).lower() if isinstance(value, bool) else repr(value))
+    except ValueError:  # Python writes no whole number of more than some thousand digits
+        return "a number too long to show"
+
+
+def _wrong(each: ErrorDetails, key: str, owner: str, origins: Mapping[str, str]) -> str:
+    text = each["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
+    if each["type"] in _WORDS:
+        text = _WORDS[each["type"]].format(**each.get("ctx", {}))
+    given = each["input"]
+    if isinstance(given, str | float | int):
+        text += f" (given: {shown_value(given)})"
+    # A check of several keys together names them in its message: each may stand elsewhere.
+    prefix = f"{key}." if key else ""
+    named = dict.fromkeys(prefix + word for word in re.findall(r"\w+(?:\.\w+)*", text))
+    elsewhere = [f"{n}{_origin(n, owner, origins)}" for n in named if _origin(n, owner, origins)]
+    if elsewhere:
+        text += f" ({', '.join(elsewhere)})"
+    return f"{key}{_origin(key, owner, origins)}: {text}" if key else text
+
+
+def _has_wrong_entries(loc: tuple[int | str, ...], places: list[tuple[int | str, ...]]) -> bool:
+    """Whether an array is short only because pydantic does not count its wrong entries."""
+    return any(place[:-1] == loc for place in places)
+
+
+def _dotted(loc: tuple[int | str, ...]) -> str:
+    text = ""
+    for part in loc:
+        if isinstance(part, int):
+            text += f"[{part}]"
+        else:
+            text += ("." if text else "") + (part if re.fullmatch(r"[\w-]+", part) else repr(part))
+    return _cut(text)
+
+
+def _origin(key: str, owner: str, origins: Mapping[str, str]) -> str:
+    file = origins.get(key.partition("[")[0], owner)
+    return "" if file == owner else f" in {file}"
+
+
+def _suggestion(model: type[BaseModel], loc: tuple[int | str, ...]) -> str:
+    """Name the key that may have been meant: in the same table if one is near, else in another."""
+    *parents, last = (str(part) for part in loc)
+    here = _model_at(model, tuple(parents)) if parents else model
+    for name in get_close_matches(last, here.model_fields if here else (), n=1):
+        return f" (did you mean {'.'.join([*parents, name])}?)"
+    everywhere = {key.rpartition(".")[2]: key for key in _leaf_keys(model)}
+    for name in get_close_matches(last, everywhere, n=1, cutoff=0.8):
+        return f" (did you mean {everywhere[name]}?)"
+    return ""
+
+
+def _model_at(model: type[BaseModel], loc: tuple[int | str, ...]) -> type[BaseModel] | None:
+    """Return the table at a place, or None where there is a value or nothing."""
+    here: type[BaseModel] | None = model
+    for part in loc:
+        field = here.model_fields.get(str(part)) if here else None
+        kind = field.annotation if field else None
+        here = kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
+    return here
+
+
+def _leaf_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
+    for name in model.model_fields:
+        inner = _model_at(model, (name,))
+        if inner:
+            yield from _leaf_keys(inner, f"{prefix}{name}.")
+        else:
+            yield prefix + name
+
+
+def _bounded(items: list[str], separator: str) -> str:
+    more = len(items) - SHOWN
+    return separator.join(items[:SHOWN]) + (f" and {more} more" if more > 0 else "")
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."

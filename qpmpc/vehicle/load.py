@@ -1,0 +1,151 @@
+"""Vehicle files: shipped ones by name, any by path, each alone or on top of a base.
+
+A file that says ``base = "prius-nimh"``, or the path of another file, needs only its own ``name``
+and the keys that differ. Tables are merged key by key; an array is replaced whole.
+"""
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from qpmpc.errors import InputError
+from qpmpc.problems import shown_value
+from qpmpc.settings import load_toml, validated
+from qpmpc.vehicle.names import DEFAULT_VEHICLE, VEHICLES
+from qpmpc.vehicle.parameters import Vehicle
+
+
+@dataclass(frozen=True)
+class VehicleFile:
+    """What stands in one file, before its base is merged in.
+
+    Attributes
+    ----------
+    label : how errors name it: the shipped vehicle's name, or the path
+    path : None for a shipped vehicle
+    text, data : as written, and parsed
+    """
+
+    label: str
+    path: Path | None
+    text: str
+    data: dict[str, Any]
+
+
+def vehicle_names() -> tuple[str, ...]:
+    """Return the names of the shipped vehicles, the default first."""
+    return tuple(VEHICLES.shipped)
+
+
+def load_vehicle(name_or_path: str | os.PathLike[str] = DEFAULT_VEHICLE) -> Vehicle:
+    """Load a shipped vehicle by name, or any vehicle from a TOML file.
+
+    Raises
+    ------
+    InputError
+        If the name is unknown, the file or one of its bases cannot be read, or a key or value is
+        not allowed.
+    """
+    return merged_vehicle(vehicle_files(name_or_path))
+
+
+def vehicle_files(name_or_path: str | os.PathLike[str]) -> tuple[VehicleFile, ...]:
+    """Read a vehicle's file, its base, the base of that, and so on.
+
+    Raises
+    ------
+    InputError
+        If one cannot be read or is no TOML, or if the bases go round in a circle.
+    """
+    files = [_read(name_or_path, "")]
+    while "base" in files[-1].data:
+        base = _read_base(files[-1])
+        files.append(base)
+        if any(_same(base, earlier) for earlier in files[:-1]):
+            circle = " -> ".join(file.label for file in files)
+            raise InputError(f"{files[0].label}: its bases go round in a circle: {circle}")
+    return tuple(files)
+
+
+def merged_vehicle(files: tuple[VehicleFile, ...]) -> Vehicle:
+    """Build the vehicle of a file and its bases, the file first.
+
+    Raises
+    ------
+    InputError
+        If a key is missing or unknown or a value is not allowed; says in which file.
+    """
+    data: dict[str, Any] = {}
+    for file in reversed(files):
+        data = _merged(data, {key: value for key, value in file.data.items() if key != "base"})
+    if "name" not in files[0].data:
+        data.pop("name", None)  # two vehicles of one name could not be told apart in results
+    labels = {key: file.label for key, file in origins(files).items()}
+    return validated(Vehicle, data, files[0].label, labels)
+
+
+def origins(files: tuple[VehicleFile, ...]) -> dict[str, VehicleFile]:
+    """Map each dotted key to the file whose value counts."""
+    return {key: file for file in reversed(files) for key in _dotted_keys(file.data)}
+
+
+def _read_base(file: VehicleFile) -> VehicleFile:
+    base = file.data["base"]
+    if not isinstance(base, str):
+        raise InputError(
+            f"{file.label}: base must be the name of a shipped vehicle or of a .toml file "
+            f"(given: {shown_value(base)})"
+        )
+    if base in VEHICLES or file.path is None:
+        return _read(base, f"{file.label}: base: ")
+    # relative to the file that names it: a folder of vehicles can be moved as it is
+    path = file.path.parent / base
+    return _read(path if path.suffix == ".toml" else base, f"{file.label}: base: ")
+
+
+def _read(name_or_path: str | os.PathLike[str], where: str) -> VehicleFile:
+    label = os.fspath(name_or_path)
+    if label in VEHICLES.shipped:
+        text = (resources.files("qpmpc.vehicle") / "data" / f"{label}.toml").read_text("utf-8")
+        return VehicleFile(label, None, text, load_toml(text, label))
+    path = Path(VEHICLES.find(label) if label in VEHICLES.added else label)
+    if path.suffix != ".toml":
+        raise InputError(f"{where}{VEHICLES.unknown(label)}")
+    try:
+        text = path.read_text("utf-8")
+    except UnicodeDecodeError as error:
+        reason = "not a UTF-8 text file"
+        raise InputError(f"{where}cannot read vehicle file {label}: {reason}") from error
+    except (OSError, ValueError) as error:  # ValueError: a path with a null character
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{where}cannot read vehicle file {label}: {reason}") from error
+    return VehicleFile(label, path, text, load_toml(text, label))
+
+
+def _same(one: VehicleFile, other: VehicleFile) -> bool:
+    if one.path is None or other.path is None:
+        return one.path is other.path and one.label == other.label
+    return one.path.resolve() == other.path.resolve()
+
+
+def _merged(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
+    """Put one file's tables and values over those of its base: a vehicle's tables are flat."""
+    result = dict(base)
+    for key, value in own.items():
+        under = result.get(key)
+        if isinstance(value, dict) and isinstance(under, dict):
+            result[key] = {**under, **value}
+        else:
+            result[key] = value
+    return result
+
+
+def _dotted_keys(data: dict[str, Any]) -> Iterator[str]:
+    """Keys of tables and of the values in them, such as ``battery`` and ``battery.soc_min``."""
+    for key, value in data.items():
+        yield key
+        if isinstance(value, dict):
+            yield from (f"{key}.{inner}" for inner in value)
