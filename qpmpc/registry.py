@@ -156,7 +156,10 @@ def split_settings(
             )
     chosen = ControllerSettings().with_settings(of_controllers)
     for section in chosen.others:
-        model = own.get(section) or _table_of(named[section]).settings_model(named[section])
+        if section in own:
+            model = own[section]
+        else:
+            model = _table_of(named[section]).settings_model(named[section])
         if model is None:
             raise InputError(f"controller {section.replace('_', '-')!r} has no settings of its own")
         chosen.of(section, model())  # refuses what does not fit
