@@ -1,5 +1,6 @@
 # make run    the main job: real cycles, rule-based against MPC, tables and pictures in results/
 # make test   style, types and tests
+# make docs   API reference from the docstrings, in build/api
 # make clean  remove everything these made
 # Both first make the virtual environment .venv; a second time that is skipped.
 
@@ -14,7 +15,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 # in which the mapped folders are where they are imported from.
 TYPED := build/typed
 
-.PHONY: run test lint types venv clean
+.PHONY: run test lint types docs venv clean
 
 run: $(STAMP)
 	$(BIN)/qpmpc compare nycc nedc-truncated --controllers rule-based,mh-qp-paper,mh-qp --out results
@@ -29,6 +30,9 @@ types: $(STAMP)
 	@rm -rf $(TYPED) && mkdir -p $(TYPED)/qpmpc
 	@cd $(TYPED)/qpmpc && ln -s ../../../qpmpc/* ../../../codegen ../../../cycles ../../../verification .
 	cd $(TYPED) && ../../$(BIN)/mypy --config-file ../../pyproject.toml --cache-dir ../../.mypy_cache -p qpmpc
+
+docs: $(STAMP)
+	$(BIN)/pdoc qpmpc --docformat numpy --output-directory build/api
 
 venv: $(STAMP)
 
