@@ -22,7 +22,7 @@ FLOWS = (
     "step_time_s",
     "iterations",
     "relaxation_gap",
-    "sigma",
+    "on_share",
 )
 COLUMNS = ("time_s", *STATES, *FLOWS, "fallback")
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from qpmpc.codegen.host_library import compiler
-from qpmpc.controllers.mh_qp import MhQpSettings
+from qpmpc.controllers.settings import MhQpSettings
 
 EXTRAS = (
     *("matplotlib", "plotly", "pandas", "casadi", "numba", "piqp", "clarabel", "daqp", "qoco"),
@@ -26,7 +26,7 @@ def test_default_is_a_host_project_that_builds(cli, tmp_path):
     stages = settings.horizon.short_stages + settings.horizon.blocks * settings.horizon.classes
     assert done.out == (
         f"{folder}: {len(names)} files written, target host, f32, solver admm, {stages} stages, "
-        f"{settings.osqp.iterations} iterations a step; start with README.md\n"
+        f"{settings.admm.iterations} iterations a step; start with README.md\n"
     )
     assert {"README.md", "NOTICE", "Makefile", "mpc.h", "mpc_admm.c", "mpc_data.c"} <= set(names)
     readme = (folder / "README.md").read_text()
@@ -95,10 +95,13 @@ def test_writing_again_replaces_its_files_and_leaves_others_alone(cli, tmp_path)
         (["out", "--iterations", "many"], ["--iterations", "integer"]),
         (["out", "--vehicle", "beetle"], ["beetle", "prius-nimh"]),
         (["out", "--set", "x"], ["KEY=VALUE"]),
-        (["out", "--set", "mh_qp.osqp.iteration=9"], ["iteration", "iterations"]),
+        (["out", "--set", "mh_qp.admm.iteration=9"], ["iteration", "iterations"]),
         (["out", "--set", "mh_qp.horizon.blocks=0"], ["mh_qp.horizon.blocks"]),
         (["out", "--set", "mh_qp.qp.terminal_high=1"], ["terminal_high"]),
-        (["out", "--solver", "osqp", "--set", "mh_qp.osqp.sigma=1.2345678e-18"], ["sigma"]),
+        (
+            ["out", "--solver", "osqp", "--set", "mh_qp.admm.proximal_weight=1.2345678e-18"],
+            ["proximal_weight"],
+        ),
         (["file"], ["file"]),
         (["file/deeper"], ["file"]),
     ],

@@ -3,12 +3,18 @@
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
-import qpmpc.runners
 from qpmpc.cli import main
+
+
+def in_place_of_runs(monkeypatch: pytest.MonkeyPatch, function: Callable[..., NoReturn]) -> None:
+    monkeypatch.setattr("qpmpc.simulation.drive", function)
+    monkeypatch.setattr("qpmpc.comparison.drive", function)
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -33,8 +39,8 @@ def files(folder: Path) -> dict[str, bytes]:
         (["simulate", "nycc", "--set", "thermal.t_ambient=1"], ["t_ambient", "t_amb_degc"]),
         (["simulate", "nycc", "--set", "thermal.t_amb_degc=warm"], ["t_amb_degc", "warm"]),
         (["simulate", "nycc", "--set", "trip.soc_init=0.9"], ["soc_init"]),
-        (["simulate", "nycc", "--set", "mh_qp.osqp.iterations=0"], ["iterations"]),
-        (["simulate", "nycc", "--set", "mh_qp.osqp.iteration=9"], ["iteration", "iterations"]),
+        (["simulate", "nycc", "--set", "mh_qp.admm.iterations=0"], ["iterations"]),
+        (["simulate", "nycc", "--set", "mh_qp.admm.iteration=9"], ["iteration", "iterations"]),
         (["simulate", "nycc", "--json", "."], ["--json", "directory"]),
         (["simulate", "nycc", "--json", "file/run.json"], ["--json", "file"]),
         (["simulate", "nycc", "--out", "file"], ["--out", "file"]),
@@ -54,14 +60,14 @@ def files(folder: Path) -> dict[str, bytes]:
         (["vehicles", "nonsense", "--toml"], ["nonsense", "prius-nimh"]),
         (["vehicles", "missing.toml", "--toml"], ["missing.toml"]),
         (["simulate", "nycc", "--set", "thermal.t_amb_degc=true"], ["t_amb_degc", "true"]),
-        (["simulate", "nycc", "--set", "mh_qp.osqp.iterations=true"], ["iterations", "true"]),
+        (["simulate", "nycc", "--set", "mh_qp.admm.iterations=true"], ["iterations", "true"]),
     ],
 )
 def test_bad_input_is_one_line_and_nothing_is_written(cli, tmp_path, monkeypatch, args, words):
-    def no_run(*_):
+    def no_run(*_, **__):
         raise AssertionError("bad input must be found before any run")
 
-    monkeypatch.setattr(qpmpc.runners, "run", no_run)
+    in_place_of_runs(monkeypatch, no_run)
     monkeypatch.chdir(tmp_path)
     Path("file").write_text("not a folder")
     before = files(tmp_path)
@@ -106,10 +112,10 @@ def test_missing_package_is_found_before_any_run(cli, trip, monkeypatch, name, p
 
 
 def test_anything_else_is_one_line_and_exit_code_1(cli, trip, tmp_path, monkeypatch):
-    def broken(*_):
+    def broken(*_, **__):
         raise RuntimeError("the first line\nand the second")
 
-    monkeypatch.setattr(qpmpc.runners, "run", broken)
+    in_place_of_runs(monkeypatch, broken)
     done = cli("simulate", trip, "--out", tmp_path / "out")
     assert (done.code, done.out) == (1, "")
     assert done.err.count("\n") == 1
@@ -134,25 +140,26 @@ def test_full_disk_leaves_no_part_of_a_file(cli, trip, tmp_path, monkeypatch):
 
 
 def test_interrupt(cli, trip, monkeypatch):
-    def interrupted(*_):
+    def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(qpmpc.runners, "run", interrupted)
+    in_place_of_runs(monkeypatch, interrupted)
     done = cli("simulate", trip)
     assert done.code == 130
     assert done.err == "qpmpc: interrupted\n"
 
 
-@pytest.mark.parametrize("solver", ["osqp", "generated"])
-def test_interrupt_reaches_a_run_that_spends_its_time_in_the_solver(tmp_path, solver):
+@pytest.mark.parametrize("implementation", ["python", "c"])
+def test_interrupt_reaches_a_run_that_spends_its_time_in_the_solver(tmp_path, implementation):
     """OSQP catches the signal itself and would swallow it."""
     script = (
         "import os, signal, threading\n"
-        "import qpmpc.codegen, qpmpc.runners\n"  # some packages swallow it while they load
+        # some packages swallow it while they load
+        "import qpmpc.codegen.implementation, qpmpc.simulation\n"
         "from qpmpc.cli import main\n"
         "threading.Timer(2.0, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
-        "main(['simulate', 'wltc-3b', '--set', 'mh_qp.osqp.iterations=5000',"
-        f" '--set', 'mh_qp.solver={solver}'])\n"
+        "main(['simulate', 'wltc-3b', '--set', 'mh_qp.admm.iterations=5000',"
+        f" '--set', 'mh_qp.implementation={implementation}'])\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path

@@ -13,7 +13,7 @@ from qpmpc.codegen.pareto import ITERATIONS
 
 MISSING = missing_tools()
 needs_tools = pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}")
-QUICK = ("--set", "mh_qp.osqp.cold_iterations=50")
+QUICK = ("--set", "mh_qp.admm.cold_iterations=50")
 
 
 @needs_tools
@@ -107,8 +107,8 @@ def no_run(monkeypatch):
         (["nycc", "--pareto=3"], ["--pareto"]),
         (["nycc", "--vehicle", "beetle"], ["beetle", "prius-nimh"]),
         (["nycc", "--set", "x"], ["KEY=VALUE"]),
-        (["nycc", "--set", "mh_qp.osqp.iterations=0"], ["iterations"]),
-        (["nycc", "--set", "mh_qp.osqp.relaxation=2.5"], ["relaxation"]),
+        (["nycc", "--set", "mh_qp.admm.iterations=0"], ["iterations"]),
+        (["nycc", "--set", "mh_qp.admm.relaxation=2.5"], ["relaxation"]),
         (["nycc", "--json", "."], ["--json", "directory"]),
         (["nycc", "--out", "file"], ["--out", "file"]),
         (["nycc", "--pareto", "--out", "file/deeper"], ["--out", "file"]),

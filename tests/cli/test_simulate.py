@@ -3,23 +3,23 @@ from pathlib import Path
 
 import pytest
 
-# What scripts that read the JSON of a run rely on. `comparable` and
-# `sigma_integral_share` came on top of it.
+# What scripts that read the JSON of a run rely on. `comparable`, `sigma_integral_share`,
+# `solver.implementation` and `remarks` came on top of it.
 KEYS = {
     "cycle", "controller", "vehicle", "distance_km", "fuel_g", "fuel_soc_balanced_g",
     "comparable", "soc_init", "soc_end", "soc_min", "soc_max", "t_cl_min_degc", "t_cl_max_degc",
     "t_cl_end_degc", "engine_starts", "engine_on_share", "violations", "fallback_steps",
-    "relaxation_gap", "sigma_integral_share", "step_time_ms", "solver",
+    "relaxation_gap", "sigma_integral_share", "step_time_ms", "solver", "remarks",
 }  # fmt: skip
 INNER_KEYS = {
     "violations": {"soc", "t_cl_degc", "power_w"},
     "relaxation_gap": {"max", "mean"},
     "step_time_ms": {"median", "p99", "max"},
-    "solver": {"name", "iterations_max", "iterations_median"},
+    "solver": {"name", "implementation", "iterations_max", "iterations_median"},
 }
 
 
-SOLVERS = {"mh-qp": "generated f64", "mh-qp-paper": "osqp", "mh-nlp": "ipopt", "rule-based": None}
+SOLVERS = {"mh-qp": "admm f64", "mh-qp-paper": "osqp", "mh-nlp": "ipopt", "rule-based": None}
 
 
 @pytest.mark.parametrize("controller", SOLVERS)
@@ -33,6 +33,8 @@ def test_json_has_the_keys_of_the_contract(cli, strict_json, trip, controller):
     assert run["controller"] == controller
     assert run["cycle"] == "short"
     assert run["solver"]["name"] == SOLVERS[controller]
+    assert run["solver"]["implementation"] == ("c" if controller == "mh-qp" else "python")
+    assert run["remarks"] == []
 
 
 def test_with_json_on_stdout_the_table_is_on_stderr(cli, trip):
@@ -74,7 +76,7 @@ def test_set_reaches_the_vehicle(cli, strict_json, trip):
 def test_set_reaches_the_controllers(cli, strict_json, trip):
     args = ("simulate", trip, "--json", "-", "--set")
     assert (
-        strict_json(cli(*args, "mh_qp.osqp.iterations=7").out)["solver"]["iterations_median"] == 7
+        strict_json(cli(*args, "mh_qp.admm.iterations=7").out)["solver"]["iterations_median"] == 7
     )
     # a reference far below the initial SOC drains the battery, one far above fills it
     rules = ("--controller", "rule-based", "--set", "rule_based.balance=false")

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-import qpmpc.verification.checks as package
+import qpmpc.registry
 from qpmpc.verification.checks import Check, Group
 from qpmpc.verification.checks.physics_checks import constant_demand, engine_covers_demand
 from qpmpc.verification.checks.pwa_checks import bounds_hold
@@ -30,7 +30,15 @@ def groups(monkeypatch):
         Group("Curves", (bounds_hold,)),
         Group("Physics", (constant_demand, engine_covers_demand)),
     ]
-    monkeypatch.setattr(package, "selected", lambda quick: chosen)
+
+    class Chosen:
+        def names(self):
+            return tuple(group.title for group in chosen)
+
+        def find(self, name):
+            return next(group for group in chosen if group.title == name)
+
+    monkeypatch.setattr(qpmpc.registry, "CHECKS", Chosen())
     return chosen
 
 

@@ -15,16 +15,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from qpmpc.codegen import generated_controller
+from qpmpc.closed_loop import drive
+from qpmpc.codegen.controller import GeneratedController
 from qpmpc.codegen.generate import Precision, project_files
 from qpmpc.codegen.host_library import compiled, compiler
-from qpmpc.controllers.base import Decision, Observation
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
-from qpmpc.preview import Trace
 from qpmpc.results import Run
-from qpmpc.simulate import simulate
-from qpmpc.vehicle import Plant, Vehicle, load_vehicle
+from qpmpc.trip import Trip
+from qpmpc.vehicle import Vehicle, load_vehicle
 
 TOOLS = {"a C compiler": compiler(), "valgrind": shutil.which("valgrind")}
 MISSING = [name for name, found in TOOLS.items() if found is None]
@@ -57,25 +56,16 @@ int main(int argc, char **argv)
 
 
 class Recorder:
-    """The generated controller of a trip; what goes in and comes out is kept as bytes."""
+    """The generated controller drives a trip; what goes in and comes out is kept as bytes."""
 
-    name = "mh-qp"
-
-    def __init__(
-        self, trip: Cycle, vehicle: Vehicle, settings: ControllerSettings, precision: Precision
-    ) -> None:
-        trace = Trace.of(trip, vehicle)
-        self.controller = generated_controller(
-            Plant(vehicle), trace, settings=settings, precision=precision
-        )
-        self.solver_name = self.controller.solver_name
+    def __init__(self, trip: Trip, settings: ControllerSettings, precision: Precision) -> None:
+        self.controller = GeneratedController(trip, settings, precision=precision)
         self.inputs, self.outputs = bytearray(), bytearray()
+        self.run = drive(trip, self.controller, on_step=self._keep)
 
-    def decide(self, seen: Observation) -> Decision:
-        decision = self.controller.decide(seen)
+    def _keep(self, *_: object) -> None:
         self.inputs += bytes(self.controller._in)
         self.outputs += bytes(self.controller._out)
-        return decision
 
 
 def counted(
@@ -86,8 +76,7 @@ def counted(
 ) -> tuple[NDArray[np.int64], Run]:
     """Drive a trip; return the instructions of each call of mpc_step, and the run."""
     settings = ControllerSettings().with_settings(overrides or {})
-    recorder = Recorder(trip, vehicle, settings, precision)
-    run = simulate(trip, recorder, vehicle)
+    recorder = Recorder(Trip(trip, vehicle), settings, precision)
     project = project_files(recorder.controller.library.values, "host", precision)
     with TemporaryDirectory() as scratch:
         folder = Path(scratch)
@@ -115,7 +104,7 @@ def counted(
         )
         check_same_commands(recorder, replay.stdout)
         counts = [total(folder / f"count.{k}") for k in range(1, trip.steps + 1)]
-    return np.array(counts), run
+    return np.array(counts), recorder.run
 
 
 def check_same_commands(recorder: Recorder, replayed: bytes) -> None:
@@ -159,7 +148,7 @@ def test_instructions_are_a_fixed_part_a_part_a_stage_and_a_part_a_stage_and_ite
     for k, blocks in builds:
         size: dict[str, object] = {
             "mh_qp.prepared": False,
-            "mh_qp.osqp.iterations": k,
+            "mh_qp.admm.iterations": k,
             "mh_qp.horizon.blocks": blocks,
         }
         stages = horizon.short_stages + horizon.classes * blocks

@@ -15,9 +15,9 @@ from qpmpc.codegen.firmware import missing_tools
 from qpmpc.codegen.generate import PRECISIONS, SOLVERS, Precision, Solver
 from qpmpc.codegen.pareto import ITERATIONS
 from qpmpc.codegen.pil import CLOCKS_MHZ, CYCLES_AN_INSTRUCTION, processor_in_the_loop
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
-from qpmpc.vehicle import load_vehicle
+from qpmpc.trip import Trip
 
 MISSING = missing_tools()
 pytestmark = pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}")
@@ -41,7 +41,7 @@ def measured(
 ) -> dict[str, float]:
     """Instructions a step, flash and RAM of a few steps without departure."""
     overrides: dict[str, object] = {
-        "mh_qp.osqp.iterations": iterations,
+        "mh_qp.admm.iterations": iterations,
         "mh_qp.prepared": False,
     }
     if blocks:
@@ -49,7 +49,7 @@ def measured(
     whole = load_cycle("nycc")
     trip = Cycle.from_samples("start", whole.time_s[: STEPS + 1], whole.speed_mps[: STEPS + 1])
     settings = ControllerSettings().with_settings(overrides)
-    result = processor_in_the_loop(trip, load_vehicle(), settings, precision, solver=solver)
+    result = processor_in_the_loop(Trip(trip), settings, precision, solver=solver)
     return {
         "instructions": float(np.median(result.instructions)),
         "flash": float(result.footprint.flash),

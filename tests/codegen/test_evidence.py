@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from qpmpc.codegen import generate, values_of
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.codegen.generate import generate
+from qpmpc.codegen.values import values_of
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.vehicle import load_vehicle
 
 ROOT = Path(__file__).parents[2]

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from qpmpc.codegen import Values, generate, values_of
-from qpmpc.codegen.generate import project_files
-from qpmpc.codegen.values import CONSTANTS
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.codegen.generate import generate, project_files
+from qpmpc.codegen.values import CONSTANTS, Values, values_of
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.errors import InputError
 from qpmpc.vehicle import load_vehicle
 
@@ -37,8 +36,8 @@ def test_same_input_gives_the_same_bytes(tmp_path, target, precision) -> None:
 def test_settings_reach_the_code() -> None:
     files = project_files(
         values(
-            mh_qp__osqp__iterations=33,
-            mh_qp__osqp__rho=0.25,
+            mh_qp__admm__iterations=33,
+            mh_qp__admm__rho=0.25,
             mh_qp__horizon__blocks=4,
             mh_qp__qp__slack_g_per_k=7.5,
             rule_based__min_on_s=9,

@@ -1,6 +1,7 @@
 """The C controller on this machine against the Python controller, step by step."""
 
 import ctypes
+import json
 import math
 import os
 import subprocess
@@ -9,20 +10,23 @@ import sys
 import numpy as np
 import pytest
 
-from qpmpc.codegen import CodegenError, GeneratedController, generated_controller
-from qpmpc.codegen.host_library import compiler
+from qpmpc.closed_loop import drive
+from qpmpc.codegen.controller import GeneratedController
+from qpmpc.codegen.host_library import CodegenError, compiler
 from qpmpc.codegen.values import CONSTANTS
-from qpmpc.controllers.base import Decision, Observation
-from qpmpc.controllers.factory import ControllerSettings, make_controller
+from qpmpc.controllers.base import Decision
 from qpmpc.controllers.mh_qp import MhQp
-from qpmpc.controllers.planner import FAILURES_FORGIVEN, WARM_UP_STEPS
+from qpmpc.controllers.qp_planner import FAILURES_FORGIVEN, WARM_UP_STEPS
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.errors import InputError
-from qpmpc.preview import StageBuilder, Trace
+from qpmpc.preview import StageBuilder
 from qpmpc.preview.stages import Stages
-from qpmpc.simulate import simulate
+from qpmpc.registry import make_controller
+from qpmpc.simulation import simulate
 from qpmpc.solvers import base
-from qpmpc.vehicle import Plant, load_vehicle
+from qpmpc.trip import Trip
+from qpmpc.vehicle import load_vehicle
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
 
@@ -37,43 +41,26 @@ def settings_of(**overrides: object) -> ControllerSettings:
 
 def pair(
     cycle_name: str, precision: str = "f64", vehicle=VEHICLE, **overrides: object
-) -> tuple[Plant, Trace, GeneratedController, MhQp]:
-    cycle, plant = load_cycle(cycle_name), Plant(vehicle)
-    trace, settings = Trace.of(cycle, vehicle), settings_of(**overrides)
-    ours = generated_controller(plant, trace, settings=settings, precision=precision)
-    reference = make_controller(
-        "mh-qp", plant, trace, settings=settings.with_settings({"mh_qp.implementation": "python"})
-    )
-    assert isinstance(reference, MhQp)
-    return plant, trace, ours, reference
+) -> tuple[Trip, GeneratedController, MhQp]:
+    trip, settings = Trip(cycle_name, vehicle), settings_of(**overrides)
+    return trip, GeneratedController(trip, settings, precision=precision), MhQp(trip, settings)
 
 
-def observe(trace: Trace, state, k: int) -> Observation:
-    return Observation(
-        k,
-        state.soc,
-        state.t_cl_degc,
-        state.engine_on,
-        float(trace.demand_w[k]),
-        float(trace.speed_mps[k]),
-    )
-
-
-def compare(plant, trace, ours, reference, steps: int):
+def compare(trip, ours, reference, steps: int):
     """Drive with the reference's commands; yields both decisions and plans of every step."""
-    state = plant.initial_state()
+    state = trip.plant.initial_state()
     for k in range(steps):
-        seen = observe(trace, state, k)
+        seen = trip.observation(k, state)
         mine, its = ours.decide(seen), reference.decide(seen)
         yield mine, its
-        state, _ = plant.step(state, its.command, seen.demand_w, seen.speed_mps)
+        state, _ = trip.plant.step(state, its.command, seen.demand_w, seen.speed_mps)
 
 
 def assert_equal_decision(mine: Decision, its: Decision, power_w: float) -> None:
     assert mine.command.engine_on == its.command.engine_on
     assert mine.command.p_eng_w == pytest.approx(its.command.p_eng_w, abs=power_w)
     assert mine.fallback == its.fallback
-    assert mine.sigma == pytest.approx(its.sigma, abs=1e-6, nan_ok=True)
+    assert mine.on_share == pytest.approx(its.on_share, abs=1e-6, nan_ok=True)
     assert mine.relaxation_gap == pytest.approx(its.relaxation_gap, abs=1e-6, nan_ok=True)
 
 
@@ -81,16 +68,16 @@ def assert_equal_decision(mine: Decision, its: Decision, power_w: float) -> None
 # the KKT matrix (1e6) and carried along by the warm start, stays far below 1e-6 of the quantities.
 @pytest.mark.parametrize("name", ["nycc", "nedc-truncated"])
 def test_double_precision_equals_python_to_the_end_of_the_trip(name) -> None:
-    plant, trace, ours, reference = pair(name)
-    for mine, its in compare(plant, trace, ours, reference, trace.steps):
+    trip, ours, reference = pair(name)
+    for mine, its in compare(trip, ours, reference, trip.steps):
         assert_equal_decision(mine, its, power_w=1e-3)
 
 
 def test_primal_and_dual_variables_equal_python() -> None:
-    plant, trace, ours, reference = pair("nycc")
-    for _ in compare(plant, trace, ours, reference, 100):
+    trip, ours, reference = pair("nycc")
+    for _ in compare(trip, ours, reference, 100):
         x, duals = ours.plan()
-        plan = reference.planner.plan
+        plan = reference.planner.last
         assert plan is not None
         scale = np.abs(plan.x).max(axis=0)
         np.testing.assert_allclose(x[:, :6] / scale[:6], plan.x[:, :6] / scale[:6], atol=1e-8)
@@ -102,7 +89,7 @@ def test_primal_and_dual_variables_equal_python() -> None:
     ("vehicle", "overrides"),
     [
         ("prius-liion", {}),
-        ("prius-nimh", {"mh_qp__scaling__duration_exponent": 1.0, "mh_qp__osqp__iterations": 17}),
+        ("prius-nimh", {"mh_qp__scaling__duration_exponent": 1.0, "mh_qp__admm__iterations": 17}),
         ("prius-nimh", {"mh_qp__scaling__duration_exponent": 0.3}),
         ("prius-nimh", {"mh_qp__qp__soc_penalty_g": 400.0}),
         ("prius-nimh", {"mh_qp__horizon__classes": 1, "mh_qp__horizon__short_stages": 12}),
@@ -111,8 +98,8 @@ def test_primal_and_dual_variables_equal_python() -> None:
     ],
 )
 def test_other_vehicles_and_settings_equal_python(vehicle, overrides) -> None:
-    plant, trace, ours, reference = pair("nycc", vehicle=load_vehicle(vehicle), **overrides)
-    for mine, its in compare(plant, trace, ours, reference, 120):
+    trip, ours, reference = pair("nycc", vehicle=load_vehicle(vehicle), **overrides)
+    for mine, its in compare(trip, ours, reference, 120):
         assert_equal_decision(mine, its, power_w=1e-2)
 
 
@@ -122,8 +109,8 @@ def test_other_vehicles_and_settings_equal_python(vehicle, overrides) -> None:
 )
 def test_safety_layer_equals_python_at_the_limits(key, value) -> None:
     vehicle = VEHICLE.with_settings({key: value})
-    plant, trace, ours, reference = pair("nedc-truncated", vehicle=vehicle)
-    for mine, its in compare(plant, trace, ours, reference, 300):
+    trip, ours, reference = pair("nedc-truncated", vehicle=vehicle)
+    for mine, its in compare(trip, ours, reference, 300):
         assert_equal_decision(mine, its, power_w=1e-2)
 
 
@@ -131,40 +118,39 @@ def test_safety_layer_equals_python_at_the_limits(key, value) -> None:
 # power moves by some 100 W at almost no cost. What counts is fuel: 0.1 % is required.
 @pytest.mark.parametrize("name", ["nycc", "nedc-truncated"])
 def test_single_precision_burns_the_same_fuel(name) -> None:
-    cycle, plant = load_cycle(name), Plant(VEHICLE)
-    single = simulate(
-        cycle, generated_controller(plant, Trace.of(cycle, VEHICLE), precision="f32"), VEHICLE
-    )
-    python = simulate(cycle, "mh-qp", VEHICLE, settings=settings_of(mh_qp__solver="osqp"))
+    trip = Trip(name, VEHICLE)
+    single = drive(trip, GeneratedController(trip, precision="f32"))
+    python = simulate(trip, "mh-qp", settings=settings_of(mh_qp__implementation="python"))
     assert single.fuel_soc_balanced_g == pytest.approx(python.fuel_soc_balanced_g, rel=1e-3)
     assert single.summary()["violations"] == {"soc": 0.0, "t_cl_degc": 0.0, "power_w": 0.0}
     assert single.summary()["fallback_steps"] == 0
 
 
 def test_two_instances_interleaved_do_not_disturb_each_other() -> None:
-    plant, trace, alone, _ = pair("nycc")
-    first, second = pair("nycc")[2], pair("nycc")[2]
-    state = plant.initial_state()
+    trip, alone, _ = pair("nycc")
+    first, second = pair("nycc")[1], pair("nycc")[1]
+    state = trip.plant.initial_state()
     for k in range(60):
-        seen = observe(trace, state, k)
+        seen = trip.observation(k, state)
         expected = alone.decide(seen)
         assert first.decide(seen) == expected
         other = seen._replace(soc=0.5, t_cl_degc=70.0)  # leads the second one elsewhere
         second.decide(other)
-        state, _ = plant.step(state, expected.command, seen.demand_w, seen.speed_mps)
+        state, _ = trip.plant.step(state, expected.command, seen.demand_w, seen.speed_mps)
 
 
 class Raw:
     """A controller whose inputs a test can spoil."""
 
     def __init__(self, precision: str = "f64") -> None:
-        self.plant, self.trace, self.controller, _ = pair("nycc", precision)
+        self.trip, self.controller, _ = pair("nycc", precision)
+        self.controller.begin(self.trip)
         self.library = self.controller.library
-        self.state = self.plant.initial_state()
+        self.state = self.trip.plant.initial_state()
 
     def step(self, k: int, **spoilt: object):
         """Run step k with some inputs replaced: a value, or (index, value) of an array."""
-        self.controller._inputs.fill(observe(self.trace, self.state, k), self.controller._in)
+        self.controller._inputs.fill(self.trip.observation(k, self.state), self.controller._in)
         for name, value in spoilt.items():
             if isinstance(value, tuple):
                 getattr(self.controller._in, name)[value[0]] = value[1]
@@ -226,7 +212,7 @@ def test_departure_refuses_bad_input_and_does_nothing_under_way() -> None:
     raw = Raw()
     controller, library = raw.controller, raw.library
     library.init(controller._state)
-    raw.controller._inputs.fill(observe(raw.trace, raw.state, 0), controller._in)
+    raw.controller._inputs.fill(raw.trip.start, controller._in)
     controller._in.long_net_w[0] = math.nan
     assert library.depart(controller._state, ctypes.byref(controller._in)) == -1
     raw.step(0)
@@ -238,7 +224,7 @@ def test_departure_cut_short_is_a_warm_start() -> None:
     raw = Raw()
     controller, library = raw.controller, raw.library
     library.init(controller._state)
-    raw.controller._inputs.fill(observe(raw.trace, raw.state, 0), controller._in)
+    raw.controller._inputs.fill(raw.trip.start, controller._in)
     for _ in range(7):
         assert library.depart(controller._state, ctypes.byref(controller._in)) == 1
     outs = [raw.step(k) for k in range(6)]
@@ -289,11 +275,11 @@ SPOILT = 10
 
 def flags_after_a_spoilt_preview() -> list[int]:
     """Flags of the steps from the spoilt one on; every decision equals Python's."""
-    plant, trace, ours, reference = pair("nycc")
+    trip, ours, reference = pair("nycc")
     ours._inputs._preview = SpoiltPreview(ours._inputs._preview, SPOILT)
     reference.planner.preview = SpoiltPreview(reference.planner.preview, SPOILT)
     flags = []
-    for mine, its in compare(plant, trace, ours, reference, SPOILT + 12):
+    for mine, its in compare(trip, ours, reference, SPOILT + 12):
         assert_equal_decision(mine, its, power_w=1e-2)
         flags.append(ours._out.flags)
     return flags[SPOILT:]
@@ -314,32 +300,31 @@ def test_a_plan_from_which_solves_fail_again_and_again_is_given_up_by_both() -> 
 
 
 def test_default_is_generated_c_where_it_can_be_and_osqp_elsewhere(monkeypatch) -> None:
-    plant = Plant(VEHICLE)
-    trace = Trace.of(load_cycle("nycc"), VEHICLE)
+    trip, in_c, in_python = Trip("nycc", VEHICLE), ("admm f64", "c"), ("osqp", "python")
 
-    def solver_name(**overrides: object) -> str:
-        return make_controller("mh-qp", plant, trace, settings=settings_of(**overrides)).solver_name
+    def made(**overrides: object) -> tuple[str, str]:
+        controller = make_controller("mh-qp", trip, settings_of(**overrides))
+        return controller.solver_name, controller.implementation
 
-    assert solver_name() == "generated f64"
-    assert solver_name(mh_qp__solver="osqp") == "osqp"
+    assert made() == in_c
+    assert made(mh_qp__implementation="python") == in_python
     no_blocks = {"mh_qp__horizon__blocks": 0, "mh_qp__horizon__block_s": 0}
-    assert solver_name(**no_blocks) == "osqp"
+    assert made(**no_blocks) == in_python
     with pytest.raises(InputError, match="blocks"):
-        solver_name(mh_qp__solver="generated", **no_blocks)
+        made(mh_qp__implementation="c", **no_blocks)
     with monkeypatch.context() as patch:
-        patch.setattr("qpmpc.codegen.compiler", lambda: None)
-        assert solver_name() == "osqp"
+        patch.setattr("qpmpc.codegen.implementation.compiler", lambda: None)
+        assert made() == in_python
 
 
 def test_a_compiler_that_fails_is_named_and_the_default_does_without(monkeypatch, tmp_path) -> None:
-    plant = Plant(VEHICLE)
-    trace = Trace.of(load_cycle("nycc"), VEHICLE)
+    trip = Trip("nycc", VEHICLE)
     monkeypatch.setenv("QPMPC_CACHE_DIR", str(tmp_path))
     for broken in ("/bin/false", "/bin/true"):
         monkeypatch.setenv("CC", broken)
-        assert make_controller("mh-qp", plant, trace).solver_name == "osqp"
-        with pytest.raises(CodegenError, match=f"{broken} failed: .*mh_qp.solver=osqp"):
-            generated_controller(plant, trace)
+        assert make_controller("mh-qp", trip).solver_name == "osqp"
+        with pytest.raises(CodegenError, match=f"{broken} failed: .*mh_qp.implementation=python"):
+            GeneratedController(trip)
     assert not list((tmp_path / "compiled").iterdir())
 
 
@@ -351,7 +336,7 @@ def test_a_damaged_library_in_the_cache_is_built_again(tmp_path) -> None:
     environment = os.environ | {"QPMPC_CACHE_DIR": str(tmp_path / "cache")}
     for _ in range(2):
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-        assert "generated f64" in done.stdout
+        assert json.loads(done.stdout)["solver"]["implementation"] == "c"
         (library,) = (tmp_path / "cache" / "compiled").iterdir()
         assert library.stat().st_size > 1000
         library.write_bytes(b"")
@@ -362,26 +347,25 @@ def test_trip_too_short_for_its_blocks() -> None:
     speed_mps = load_cycle("nycc").speed_mps[488:519]  # from stop to stop
     assert speed_mps[0] == speed_mps[-1] == 0.0
     short = Cycle("short", np.arange(31.0), speed_mps, np.zeros(31))
-    trace, plant = Trace.of(short, VEHICLE), Plant(VEHICLE)
     fuel = [
-        simulate(short, make_controller("mh-qp", plant, trace, settings=chosen), VEHICLE).fuel_g
-        for chosen in (settings_of(), settings_of(mh_qp__solver="osqp"))
+        simulate(short, "mh-qp", VEHICLE, settings={"mh_qp.implementation": chosen}).fuel_g
+        for chosen in ("auto", "python")
     ]
     assert fuel[0] == pytest.approx(fuel[1], rel=1e-6)
 
 
 def test_reset_on_the_road_costs_the_same_warm_up_as_in_python() -> None:
-    plant, trace, ours, reference = pair("nycc")
-    state, rungs = plant.initial_state(), []
+    trip, ours, reference = pair("nycc")
+    state, rungs = trip.plant.initial_state(), []
     for k in range(260):
         if k == 200:
-            ours.reset()
-            reference.reset()
-        mine, its = (c.decide(observe(trace, state, k)) for c in (ours, reference))
+            ours.forget()
+            reference.forget()
+        seen = trip.observation(k, state)
+        mine, its = (c.decide(seen) for c in (ours, reference))
         if k > 210:  # the rules, whose memory C has lost, drive the first seconds after the reset
             assert mine.command.p_eng_w == pytest.approx(its.command.p_eng_w, abs=1.0)
         assert (mine.fallback == "rule-based") == (its.fallback == "rule-based")
         rungs.append(mine.fallback)
-        demand_w, speed_mps = float(trace.demand_w[k]), float(trace.speed_mps[k])
-        state, _ = plant.step(state, its.command, demand_w, speed_mps)
+        state, _ = trip.plant.step(state, its.command, seen.demand_w, seen.speed_mps)
     assert rungs.count("rule-based") == WARM_UP_STEPS - 1

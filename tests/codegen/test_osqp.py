@@ -11,29 +11,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from qpmpc.codegen import GeneratedController, generate, values_of
-from qpmpc.codegen.controller import InputBuilder
-from qpmpc.codegen.generate import project_files
+from qpmpc.codegen.controller import GeneratedController
+from qpmpc.codegen.generate import generate, project_files
 from qpmpc.codegen.host_library import HostLibrary, compiled, compiler
 from qpmpc.codegen.osqp_source import matrix_pattern
-from qpmpc.codegen.values import Values
-from qpmpc.controllers.base import Observation
-from qpmpc.controllers.factory import ControllerSettings, make_controller
+from qpmpc.codegen.values import Values, values_of
 from qpmpc.controllers.mh_qp import MhQp
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import load_cycle
 from qpmpc.errors import InputError
-from qpmpc.preview import StageBuilder, Trace
-from qpmpc.simulate import simulate
-from qpmpc.vehicle import Plant, load_vehicle
+from qpmpc.simulation import simulate
+from qpmpc.trip import Observation, Trip
+from qpmpc.vehicle import load_vehicle
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
 
 CAR = load_vehicle()
 NYCC = load_cycle("nycc")
-TRACE = Trace.of(NYCC, CAR)
+TRIP = Trip(NYCC, CAR)
 SETTINGS = ControllerSettings()
-OSQP: dict[str, object] = {"mh_qp.implementation": "python"}
-IN_PYTHON = SETTINGS.with_settings(OSQP)
 SOLVER_FAILED, WARMING_UP = 4, 8
 
 
@@ -54,42 +50,44 @@ def files() -> dict[str, str]:
     return project_files(numbers(), "host", "f64", "osqp")
 
 
+def waiting(library: HostLibrary, trip=TRIP, settings=SETTINGS) -> GeneratedController:
+    """Make a controller on a library of ours."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("qpmpc.codegen.controller.build_host_library", lambda *_: library)
+        return GeneratedController(trip, settings)
+
+
 def controller(
-    library: HostLibrary, trace=TRACE, settings=SETTINGS, vehicle=CAR, prepared=True
+    library: HostLibrary, trip=TRIP, settings=SETTINGS, prepared=True
 ) -> GeneratedController:
-    preview = StageBuilder(vehicle, trace, trace, settings.mh_qp.horizon)
-    start = None
-    if prepared:
-        trip = vehicle.trip
-        at = (trip.soc_init, trip.t_cl_init_degc, False)
-        start = Observation(0, *at, float(trace.demand_w[0]), float(trace.speed_mps[0]))
-    return GeneratedController(library, InputBuilder(preview, trace), start)
+    """Make a controller that is initialised and, if prepared, has its first plan."""
+    ours = waiting(library, trip, settings.with_settings({"mh_qp.prepared": prepared}))
+    ours.begin(trip)
+    return ours
 
 
-def drive(ours, steps: int, reference=None, vehicle=CAR):
+def drive(ours, steps: int, reference=None, trip=TRIP):
     """Drive NYCC with the reference's commands, or ours; yields decisions of both."""
-    plant = Plant(vehicle)
-    state = plant.initial_state()
+    state = trip.plant.initial_state()
     for k in range(steps):
-        seen = Observation(k, *state, float(TRACE.demand_w[k]), float(TRACE.speed_mps[k]))
+        seen = trip.observation(k, state)
         mine = ours.decide(seen)
         its = reference.decide(seen) if reference else mine
         yield mine, its
-        state, _ = plant.step(state, its.command, seen.demand_w, seen.speed_mps)
+        state, _ = trip.plant.step(state, its.command, seen.demand_w, seen.speed_mps)
 
 
 # The same program, factorised in another order: round-off, as with the solver of our own.
 def test_double_precision_equals_python_to_the_end_of_the_trip(files) -> None:
     ours = controller(library_of(files))
-    reference = make_controller("mh-qp", Plant(CAR), TRACE, settings=IN_PYTHON)
-    assert isinstance(reference, MhQp)
-    for k, (mine, its) in enumerate(drive(ours, TRACE.steps, reference)):
+    reference = MhQp(TRIP)
+    for k, (mine, its) in enumerate(drive(ours, TRIP.steps, reference)):
         assert mine.command.engine_on == its.command.engine_on
         assert mine.command.p_eng_w == pytest.approx(its.command.p_eng_w, abs=1e-3)
         assert (mine.fallback, mine.iterations) == (its.fallback, its.iterations)
         if k < 60:
             x, duals = ours.plan()
-            plan = reference.planner.plan
+            plan = reference.planner.last
             assert plan is not None
             scale = np.abs(plan.x).max(axis=0)
             np.testing.assert_allclose(x[:, :6] / scale[:6], plan.x[:, :6] / scale[:6], atol=1e-8)
@@ -102,7 +100,7 @@ def test_double_precision_equals_python_to_the_end_of_the_trip(files) -> None:
         ("prius-liion", {}),
         ("prius-nimh", {"mh_qp.qp.soc_penalty_g": 400.0}),  # a Hessian that changes
         ("prius-nimh", {"mh_qp.horizon.classes": 1, "mh_qp.horizon.short_stages": 12}),
-        ("prius-nimh", {"mh_qp.osqp.iterations": 17, "mh_qp.scaling.duration_exponent": 1.0}),
+        ("prius-nimh", {"mh_qp.admm.iterations": 17, "mh_qp.scaling.duration_exponent": 1.0}),
         ("prius-nimh", {"mh_qp.prepared": False}),
     ],
 )
@@ -110,11 +108,9 @@ def test_other_vehicles_and_settings_equal_python(vehicle, overrides) -> None:
     car, settings = load_vehicle(vehicle), SETTINGS.with_settings(overrides)
     of_car = numbers(settings, car)
     library = HostLibrary(compiled(project_files(of_car, "host", "f64", "osqp")), of_car, "f64")
-    ours = controller(library, TRACE, settings, car, settings.mh_qp.prepared)
-    reference = make_controller(
-        "mh-qp", Plant(car), TRACE, settings=settings.with_settings(OSQP)
-    )
-    for mine, its in drive(ours, 120, reference, car):
+    trip = Trip(NYCC, car)
+    ours = controller(library, trip, settings, settings.mh_qp.prepared)
+    for mine, its in drive(ours, 120, MhQp(trip, settings), trip):
         assert mine.command.engine_on == its.command.engine_on
         assert mine.command.p_eng_w == pytest.approx(its.command.p_eng_w, abs=1e-2)
         assert mine.fallback == its.fallback
@@ -122,8 +118,8 @@ def test_other_vehicles_and_settings_equal_python(vehicle, overrides) -> None:
 
 def test_single_precision_burns_the_same_fuel() -> None:
     library = library_of(project_files(numbers(), "host", "f32", "osqp"), precision="f32")
-    run = simulate(NYCC, controller(library), CAR)
-    python = simulate(NYCC, "mh-qp", CAR, settings=IN_PYTHON)
+    run = simulate(TRIP, waiting(library))
+    python = simulate(TRIP, "mh-qp", settings={"mh_qp.implementation": "python"})
     assert run.fuel_soc_balanced_g == pytest.approx(python.fuel_soc_balanced_g, rel=1e-3)
     assert run.summary()["violations"] == {"soc": 0.0, "t_cl_degc": 0.0, "power_w": 0.0}
     assert run.summary()["fallback_steps"] == 0
@@ -169,8 +165,8 @@ def test_pattern_has_the_entries_that_the_adapter_counts() -> None:
 
 def test_numbers_too_small_for_what_osqp_generates_are_refused() -> None:
     # printed with 20 decimals, sigma would be another number in C than in Python, or 0
-    settings = SETTINGS.with_settings({"mh_qp.osqp.sigma": 1.2345678e-17})
-    with pytest.raises(InputError, match=r"mh_qp\.osqp\.sigma"):
+    settings = SETTINGS.with_settings({"mh_qp.admm.proximal_weight": 1.2345678e-17})
+    with pytest.raises(InputError, match=r"mh_qp\.admm\.proximal_weight"):
         project_files(numbers(settings), "host", "f64", "osqp")
 
 
@@ -298,7 +294,7 @@ def test_a_failure_inside_osqp_is_noticed_and_leaves_nothing_behind(probed, faul
     library, probe_fault = probed
     code, is_fine = FAULTS[fault]
     ours = controller(library)
-    reference = make_controller("mh-qp", Plant(CAR), TRACE, settings=IN_PYTHON)
+    reference = MhQp(TRIP)
     seen = []
     for k, (mine, its) in enumerate(drive(ours, 14, reference)):
         if k not in (10, 11):  # spoilt, and the one that starts from an older iterate

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from qpmpc.codegen import generate, values_of
 from qpmpc.codegen.firmware import (
     Target,
     build_firmware,
@@ -14,11 +13,13 @@ from qpmpc.codegen.firmware import (
     missing_tools,
     symbols,
 )
-from qpmpc.codegen.generate import MEMORY_KB
+from qpmpc.codegen.generate import MEMORY_KB, generate
 from qpmpc.codegen.host_library import CodegenError
 from qpmpc.codegen.pil import PilResult, processor_in_the_loop
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.codegen.values import values_of
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
+from qpmpc.trip import Trip
 from qpmpc.vehicle import load_vehicle
 
 MISSING = missing_tools()
@@ -70,10 +71,9 @@ def short_trip(steps: int) -> Cycle:
 
 @pytest.fixture(scope="module", params=["f32", "f64"])
 def result(request) -> PilResult:
-    settings = SETTINGS.with_settings({"mh_qp.osqp.cold_iterations": 2000})
-    return processor_in_the_loop(
-        short_trip(150), CAR, settings, precision=request.param, solver="osqp"
-    )
+    settings = SETTINGS.with_settings({"mh_qp.admm.cold_iterations": 2000})
+    trip = Trip(short_trip(150), CAR)
+    return processor_in_the_loop(trip, settings, precision=request.param, solver="osqp")
 
 
 def test_commands_are_those_of_osqp_in_python(result) -> None:

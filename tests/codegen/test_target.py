@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from qpmpc.codegen.controller import InputBuilder, generated_controller
+from qpmpc.codegen.controller import GeneratedController, InputBuilder
 from qpmpc.codegen.firmware import (
     STACK_RESERVED_BYTES,
     Target,
@@ -18,11 +18,10 @@ from qpmpc.codegen.firmware import (
 from qpmpc.codegen.pil import PilResult, processor_in_the_loop
 from qpmpc.codegen.pil_report import pil_lines, write_pil
 from qpmpc.codegen.values import values_of
-from qpmpc.controllers.base import Observation
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
-from qpmpc.preview import StageBuilder, Trace
-from qpmpc.vehicle import Plant, load_vehicle
+from qpmpc.trip import Trip
+from qpmpc.vehicle import load_vehicle
 
 MISSING = missing_tools()
 pytestmark = pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}")
@@ -64,28 +63,26 @@ def short_trip(name: str, steps: int) -> Cycle:
 def test_double_precision_on_the_target_equals_the_host_library(tmp_path) -> None:
     # same source; fused multiply-add on the target only: round-off, as host against Python
     elf = build_firmware(VALUES, "f64", tmp_path)
-    cycle, plant = load_cycle("nycc"), Plant(VEHICLE)
-    trace = Trace.of(cycle, VEHICLE)
+    trip = Trip("nycc", VEHICLE)
     unprepared = SETTINGS.with_settings({"mh_qp.prepared": False})
-    host = generated_controller(plant, trace, settings=unprepared)
-    inputs = InputBuilder(StageBuilder(VEHICLE, trace, trace, SETTINGS.mh_qp.horizon), trace)
-    state = plant.initial_state()
+    host = GeneratedController(trip, unprepared)
+    inputs = InputBuilder(trip, SETTINGS.mh_qp)
+    state = trip.plant.initial_state()
     with Target(elf, VALUES, "f64", tmp_path) as target:
         target.init()
         in_ = target.input_type()
         for k in range(80):
-            demand_w, speed_mps = float(trace.demand_w[k]), float(trace.speed_mps[k])
-            seen = Observation(k, *state, demand_w, speed_mps)
+            seen = trip.observation(k, state)
             inputs.fill(seen, in_)
             answer, expected = target.step(in_), host.decide(seen)
             assert bool(answer.out.engine_on) == expected.command.engine_on
             assert answer.out.p_eng_w == pytest.approx(expected.command.p_eng_w, abs=1e-2)
-            state, _ = plant.step(state, expected.command, demand_w, speed_mps)
+            state, _ = trip.plant.step(state, expected.command, seen.demand_w, seen.speed_mps)
 
 
 @pytest.fixture(scope="module")
 def nycc() -> PilResult:
-    return processor_in_the_loop(load_cycle("nycc"), VEHICLE, precision="f32")
+    return processor_in_the_loop(Trip("nycc", VEHICLE), precision="f32")
 
 
 def test_firmware_drives_nycc_like_python(nycc) -> None:
@@ -119,6 +116,6 @@ def test_reports_name_what_was_measured_and_what_was_assumed(nycc, tmp_path) -> 
 
 
 def test_instruction_counts_repeat_to_the_instruction() -> None:
-    trip = short_trip("nycc", 40)
-    first, second = (processor_in_the_loop(trip, VEHICLE) for _ in range(2))
+    trip = Trip(short_trip("nycc", 40), VEHICLE)
+    first, second = (processor_in_the_loop(trip) for _ in range(2))
     np.testing.assert_array_equal(first.instructions, second.instructions)

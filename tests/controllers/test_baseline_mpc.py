@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.errors import InputError
 from qpmpc.preview import HorizonSettings, StageBuilder, Trace
 from qpmpc.results import Run
-from qpmpc.simulate import simulate
+from qpmpc.simulation import simulate
 from qpmpc.vehicle import load_vehicle
 
 VEHICLE = load_vehicle()

@@ -3,19 +3,16 @@
 import numpy as np
 import pytest
 
-from qpmpc.controllers.factory import (
-    ControllerSettings,
-    controller_names,
-    make_controller,
-    split_settings,
-)
 from qpmpc.controllers.mh_qp import MhQp
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import load_cycle
 from qpmpc.errors import InputError
-from qpmpc.preview import Trace
-from qpmpc.simulate import simulate
-from qpmpc.solvers import Osqp, QpSolution, Status
-from qpmpc.vehicle import Plant, load_vehicle
+from qpmpc.registry import controller_names, make_controller, split_settings
+from qpmpc.simulation import simulate
+from qpmpc.solvers import QpSolution, Status
+from qpmpc.solvers.osqp import Osqp
+from qpmpc.trip import Trip
+from qpmpc.vehicle import load_vehicle
 
 NO_VIOLATION = {"soc": 0.0, "t_cl_degc": 0.0, "power_w": 0.0}
 
@@ -98,23 +95,20 @@ class Flaky(Osqp):
         super().__init__()
         self._failing, self._count = failing, 0
 
-    def solve(self, data, z, y, cold=False):
-        solution = super().solve(data, z, y, cold)
+    def solve(self, data, primal, dual, cold=False):
+        solution = super().solve(data, primal, dual, cold)
         if cold:
             return solution
         self._count += 1
         if self._count in self._failing:
-            nothing = np.full_like(solution.z, np.nan)
-            return QpSolution(nothing, solution.y, Status.FAILED, 0, 0.0)
+            nothing = np.full_like(solution.primal, np.nan)
+            return QpSolution(nothing, solution.dual, Status.FAILED, 0, 0.0)
         return solution
 
 
 def _with_solver(cycle, solver):
-    plant = Plant(load_vehicle())
-    truth = Trace.of(cycle, plant.vehicle)
-    settings = ControllerSettings()
-    controller = MhQp("mh-qp", plant, truth, truth, settings.mh_qp, settings.rule_based, solver)
-    return simulate(cycle, controller, plant.vehicle)
+    trip = Trip(cycle, load_vehicle())
+    return simulate(trip, MhQp(trip, solver=solver))
 
 
 def test_one_failure_is_bridged_by_the_shifted_plan():
@@ -136,7 +130,7 @@ def test_failures_beyond_those_forgiven_cost_the_plan():
 class Dead(Osqp):
     """A solver that never gives a usable answer."""
 
-    def solve(self, data, z, y, cold=False):
+    def solve(self, data, primal, dual, cold=False):
         return QpSolution(np.full_like(data.q, np.nan), data.lower, Status.INFEASIBLE, 0, 0.0)
 
 
@@ -156,18 +150,17 @@ def test_rules_alone_end_where_they_began():
 
 
 def test_names_and_settings():
-    plant = Plant(load_vehicle())
-    truth = Trace.of(load_cycle("nycc"), plant.vehicle)
     assert controller_names()[0] == "mh-qp"
     with pytest.raises(InputError, match="rule-based"):
-        make_controller("rules", plant, truth)
-    vehicle, controllers = split_settings({"trip.soc_init": 0.5, "mh_qp.osqp.iterations": 25})
-    assert (list(vehicle), list(controllers)) == (["trip.soc_init"], ["mh_qp.osqp.iterations"])
-    assert ControllerSettings().with_settings(controllers).mh_qp.osqp.iterations == 25
+        make_controller("rules", Trip("nycc"))
+    vehicle, controllers = split_settings({"trip.soc_init": 0.5, "mh_qp.admm.iterations": 25})
+    assert vehicle == {"trip.soc_init": 0.5}
+    assert controllers == ControllerSettings().with_settings({"mh_qp.admm.iterations": 25})
+    assert controllers.mh_qp.admm.iterations == 25
     for bad in ("nonsense.x", "name"):
         with pytest.raises(InputError, match=bad):
             split_settings({bad: 1})
     with pytest.raises(InputError, match="mh_qp"):
         ControllerSettings().with_settings({"mh_qp": 1})
     with pytest.raises(InputError, match="iterations"):
-        ControllerSettings().with_settings({"mh_qp.osqp.iterations": 0})
+        ControllerSettings().with_settings({"mh_qp.admm.iterations": 0})

@@ -5,15 +5,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qpmpc.controllers.base import Observation
-from qpmpc.controllers.ecms import Ecms, EcmsSettings
+from qpmpc.controllers.ecms import Ecms
+from qpmpc.controllers.settings import ControllerSettings, EcmsSettings
 from qpmpc.cycles import Cycle, load_cycle
-from qpmpc.simulate import simulate
-from qpmpc.vehicle import Plant, load_vehicle
+from qpmpc.simulation import simulate
+from qpmpc.trip import Observation, Trip
+from qpmpc.vehicle import load_vehicle
 from qpmpc.vehicle.engine import alpha_at
 
 VEHICLE = load_vehicle()
-PLANT = Plant(VEHICLE)
+TRIP = Trip("nycc", VEHICLE)
+PLANT = TRIP.plant
+
+
+def ecms(**values: float) -> Ecms:
+    return Ecms(TRIP, ControllerSettings(ecms=EcmsSettings(**values)))
 
 
 def seen(demand_w: float, soc: float = 0.6, t_cl_degc: float = 60.0) -> Observation:
@@ -40,7 +46,7 @@ def hamiltonian_w(controller: Ecms, at: Observation, on: bool, p_eng_w: float) -
 def test_no_other_admissible_command_has_a_smaller_hamiltonian(
     demand_w: float, soc: float, t_cl_degc: float, other_w: float, other_on: bool
 ) -> None:
-    controller = Ecms(PLANT, EcmsSettings(power_step_w=50.0), 4000.0)
+    controller = ecms(power_step_w=50.0)
     at = seen(demand_w, soc, t_cl_degc)
     other_w *= other_on
     p_bat_w = demand_w + 400.0 - other_w
@@ -53,14 +59,14 @@ def test_no_other_admissible_command_has_a_smaller_hamiltonian(
 
 
 def test_a_lower_soc_makes_charge_dearer_and_the_engine_stronger() -> None:
-    at = [Ecms(PLANT, EcmsSettings(), 4000.0).decide(seen(8e3, soc)) for soc in (0.7, 0.6, 0.5)]
+    at = [ecms().decide(seen(8e3, soc)) for soc in (0.7, 0.6, 0.5)]
     power_w = [decision.command.p_eng_w for decision in at]
     assert power_w == sorted(power_w)
     assert power_w[-1] > power_w[0]
 
 
 def test_the_factor_adapts_while_the_soc_stays_low() -> None:
-    controller = Ecms(PLANT, EcmsSettings(factor_per_soc_s=0.05), 4000.0)
+    controller = ecms(factor_per_soc_s=0.05)
     before = controller.equivalence_factor(0.55)
     for _ in range(60):
         controller.decide(seen(0.0, 0.55))
@@ -69,7 +75,7 @@ def test_the_factor_adapts_while_the_soc_stays_low() -> None:
 
 
 def test_heat_is_worth_something_near_the_lower_limit_only() -> None:
-    controller = Ecms(PLANT, EcmsSettings(t_cl_band_k=3.0, heat_factor=1.5), 4000.0)
+    controller = ecms(t_cl_band_k=3.0, heat_factor=1.5)
     assert controller.heat_costate(43.0) == 0.0
     assert controller.heat_costate(41.5) == pytest.approx(0.75)
     assert controller.heat_costate(39.0) == 1.5

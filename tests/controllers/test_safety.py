@@ -5,8 +5,8 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qpmpc.controllers.base import Observation
 from qpmpc.controllers.safety import SafetyLayer
+from qpmpc.trip import Observation
 from qpmpc.vehicle import Command, Plant, PlantState, load_vehicle
 
 PLANT = Plant(load_vehicle())

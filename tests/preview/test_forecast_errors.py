@@ -17,7 +17,7 @@ from qpmpc.preview.forecast_errors import (
     stop_durations,
     travel_time_stretch,
 )
-from qpmpc.simulate import simulate
+from qpmpc.simulation import simulate
 from qpmpc.vehicle import load_vehicle
 
 VEHICLE = load_vehicle()

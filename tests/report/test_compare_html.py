@@ -7,11 +7,11 @@ from html.parser import HTMLParser
 import pytest
 
 from qpmpc import __version__
-from qpmpc.comparison import compare_runs
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.report.columns import COMPARE_COLUMNS, filled
 from qpmpc.report.compare_html import compare_html
 from qpmpc.report.trajectories import draw_trajectories
+from qpmpc.results import compare_runs
 
 VOID = {"meta", "img", "br", "link"}
 

@@ -8,12 +8,12 @@ from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
 from qpmpc.cycles import Cycle, load_cycle
+from qpmpc.registry import controller_names
 from qpmpc.report.cycle_picture import draw_cycle
 from qpmpc.report.pwa_curves import pwa_curves
 from qpmpc.report.pwa_picture import draw_pwa
 from qpmpc.report.style import BLUE, CONTROLLER_STYLES, GREEN, ORANGE, VERMILION
 from qpmpc.report.trajectories import draw_trajectories
-from qpmpc.runners import run_names
 from qpmpc.vehicle import load_vehicle, vehicle_names
 
 
@@ -40,8 +40,8 @@ def test_pictures_can_be_repeated(runs):
 
 
 def test_every_name_has_a_colour_of_its_own():
-    known = [name for name in run_names() if name in CONTROLLER_STYLES]
-    assert set(known) == set(run_names())
+    known = [name for name in controller_names() if name in CONTROLLER_STYLES]
+    assert set(known) == set(controller_names())
     colors = [color for color, _ in CONTROLLER_STYLES.values()]
     assert len(set(colors)) == len(colors)
 

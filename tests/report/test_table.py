@@ -6,8 +6,8 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
-from qpmpc.cli.table import print_rows
 from qpmpc.report.columns import COMPARE_COLUMNS, notes
+from qpmpc.report.table import print_rows
 
 
 def printed(rows, width: int) -> list[str]:

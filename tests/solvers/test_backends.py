@@ -6,12 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from qpmpc.controllers.qp_planner import Solve
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.errors import InputError
 from qpmpc.qp.stage_qp import QpData
-from qpmpc.solvers import Osqp, OsqpSettings, Status, make_solver, solver_names
+from qpmpc.solvers import AdmmSettings, Status, make_solver, solver_names
+from qpmpc.solvers.osqp import Osqp
+from qpmpc.trip import Trip
 from qpmpc.vehicle import load_vehicle
-from qpmpc.verification.benchmark.recorder import RecordedQp, Recording, record
+from qpmpc.verification.benchmark.recorder import Recording, record
 from qpmpc.verification.renderings.kkt import kkt_residuals, objective
 
 TOLERANCE = 1e-8
@@ -31,20 +34,20 @@ def recordings() -> list[Recording]:
     """City driving; a highway with coolant at its lower limit, so that its slack is in use."""
     cold = load_vehicle().with_settings({"trip.t_cl_init_degc": 40.2})
     return [
-        record(beginning("nycc", 150), load_vehicle()),
-        record(beginning("hwfet", 120), cold),
+        record(Trip(beginning("nycc", 150))),
+        record(Trip(beginning("hwfet", 120), cold)),
     ]
 
 
-def chosen(recording: Recording) -> list[RecordedQp]:
+def chosen(recording: Recording) -> list[Solve]:
     """Departure (cold), some steps on the way, and arrival, where nearly all is masked."""
-    last = len(recording.qps) - 1
-    return [recording.qps[i] for i in (0, 10, last // 2, last - 12, last)]
+    last = len(recording.solves) - 1
+    return [recording.solves[i] for i in (0, 10, last // 2, last - 12, last)]
 
 
 def infeasible(recording: Recording) -> QpData:
     """Ask for more charge at the end than the trip allows."""
-    structure, data = recording.structure, recording.qps[20].data
+    structure, data = recording.structure, recording.solves[20].data
     row = (structure.stages - 1) * structure.rows.count + structure.rows.box_soc
     lower, upper = data.lower.copy(), data.upper.copy()
     upper[row] = 4.0 * upper[row]
@@ -59,19 +62,20 @@ def test_optimum(name: str, recordings: list[Recording]) -> None:
         reference = make_solver("piqp", 1e-11)
         solver = make_solver(name, TOLERANCE)
         for backend in (reference, solver):
-            backend.setup(recording.structure, recording.qps[0].data)
+            backend.setup(recording.structure, recording.solves[0].data)
         for qp in chosen(recording):
             best = reference.solve(qp.data, None, None)
-            found = solver.solve(qp.data, qp.z, qp.y)
+            found = solver.solve(qp.data, qp.primal, qp.dual)
             if name == "highs" and not found.usable:
                 continue  # it cycles on some, and says so
             solved += 1
             assert found.status is Status.SOLVED
-            residuals = kkt_residuals(recording.structure, qp.data, found.z, found.y)
+            residuals = kkt_residuals(recording.structure, qp.data, found.primal, found.dual)
             # z and slacks are of order 100: 1e-8 of a dual, or HiGHS's 1e-8 in P, come out as 1e-6
             assert residuals.largest < 1e-5
-            assert objective(qp.data, found.z) == pytest.approx(
-                objective(qp.data, best.z), abs=OBJECTIVE * (1.0 + abs(objective(qp.data, best.z)))
+            assert objective(qp.data, found.primal) == pytest.approx(
+                objective(qp.data, best.primal),
+                abs=OBJECTIVE * (1.0 + abs(objective(qp.data, best.primal))),
             )
     assert solved >= 4
 
@@ -80,7 +84,7 @@ def test_optimum(name: str, recordings: list[Recording]) -> None:
 def test_unique_solution_is_found(name: str, recordings: list[Recording]) -> None:
     """With a definite Hessian there is one z, and every backend finds it."""
     recording = recordings[0]
-    data = recording.qps[50].data
+    data = recording.solves[50].data
     definite = replace(data, hessian=data.hessian + 1.0)
     solutions = []
     for backend in (make_solver("piqp", 1e-11), make_solver(name, TOLERANCE)):
@@ -88,28 +92,30 @@ def test_unique_solution_is_found(name: str, recordings: list[Recording]) -> Non
         solutions.append(backend.solve(definite, None, None))
     assert solutions[1].status is Status.SOLVED
     # |z - z*|^2 <= 2 (J - J*) with curvature 1, and the gap is closed relative to |J|
-    gap = TOLERANCE * abs(objective(definite, solutions[0].z))
-    np.testing.assert_allclose(solutions[1].z, solutions[0].z, atol=np.sqrt(2.0 * gap), rtol=0.0)
+    gap = TOLERANCE * abs(objective(definite, solutions[0].primal))
+    np.testing.assert_allclose(
+        solutions[1].primal, solutions[0].primal, atol=np.sqrt(2.0 * gap), rtol=0.0
+    )
 
 
 def test_osqp_converges_to_the_same_optimum(recordings: list[Recording]) -> None:
     for recording in recordings:
         reference = make_solver("piqp", 1e-11)
-        solver = Osqp(OsqpSettings(cold_iterations=40_000))
+        solver = Osqp(AdmmSettings(cold_iterations=40_000))
         for backend in (reference, solver):
-            backend.setup(recording.structure, recording.qps[0].data)
+            backend.setup(recording.structure, recording.solves[0].data)
         for qp in chosen(recording):
-            best = objective(qp.data, reference.solve(qp.data, None, None).z)
-            found = solver.solve(qp.data, qp.z, qp.y, cold=True)
-            residuals = kkt_residuals(recording.structure, qp.data, found.z, found.y)
+            best = objective(qp.data, reference.solve(qp.data, None, None).primal)
+            found = solver.solve(qp.data, qp.primal, qp.dual, cold=True)
+            residuals = kkt_residuals(recording.structure, qp.data, found.primal, found.dual)
             assert residuals.largest < 1e-3  # first order on a nearly linear problem: slow to end
-            assert objective(qp.data, found.z) == pytest.approx(best, abs=1e-3)
+            assert objective(qp.data, found.primal) == pytest.approx(best, abs=1e-3)
 
 
 @pytest.mark.parametrize("name", [*NATIVE, "qpsolvers:clarabel"])
 def test_infeasible_is_noticed_and_forgotten(name: str, recordings: list[Recording]) -> None:
     recording = recordings[0]
-    data = recording.qps[20].data
+    data = recording.solves[20].data
     solver = make_solver(name, TOLERANCE)
     solver.setup(recording.structure, data)
     before = solver.solve(data, None, None)
@@ -119,18 +125,20 @@ def test_infeasible_is_noticed_and_forgotten(name: str, recordings: list[Recordi
     assert not none.usable
     assert after.status is before.status
     if before.usable:
-        assert objective(data, after.z) == pytest.approx(objective(data, before.z), abs=OBJECTIVE)
+        assert objective(data, after.primal) == pytest.approx(
+            objective(data, before.primal), abs=OBJECTIVE
+        )
 
 
 def test_osqp_notices_infeasible_given_time(recordings: list[Recording]) -> None:
     """With few iterations it cannot; the QP's own limits are always met by construction."""
     recording = recordings[0]
     data = infeasible(recording)
-    solver = Osqp(OsqpSettings(iterations=25, cold_iterations=4000))
+    solver = Osqp(AdmmSettings(iterations=25, cold_iterations=4000))
     solver.setup(recording.structure, data)
     soon = solver.solve(data, None, None)
     assert soon.status is Status.ITERATION_LIMIT
-    assert kkt_residuals(recording.structure, data, soon.z, soon.y).primal > 1.0
+    assert kkt_residuals(recording.structure, data, soon.primal, soon.dual).primal > 1.0
     later = solver.solve(data, None, None, cold=True)
     assert later.status is Status.INFEASIBLE
     assert not later.usable
@@ -139,7 +147,7 @@ def test_osqp_notices_infeasible_given_time(recordings: list[Recording]) -> None
 @pytest.mark.parametrize("name", solver_names())
 def test_bad_data_is_refused(name: str, recordings: list[Recording]) -> None:
     recording = recordings[0]
-    data = recording.qps[20].data
+    data = recording.solves[20].data
     solver = make_solver(name)
     solver.setup(recording.structure, data)
     for bad in (
@@ -155,8 +163,8 @@ def test_bad_data_is_refused(name: str, recordings: list[Recording]) -> None:
 def test_update_equals_new_setup(name: str, recordings: list[Recording]) -> None:
     """Values brought in by an update, equalities appearing, bounds vanishing: as if set up new."""
     recording = recordings[0]
-    structure, first = recording.structure, recording.qps[40].data
-    second = recording.qps[90].data
+    structure, first = recording.structure, recording.solves[40].data
+    second = recording.solves[90].data
     row = (structure.stages - 1) * structure.rows.count + structure.rows.box_soc
     fixed = second.lower.copy(), second.upper.copy()
     fixed[1][row] = fixed[0][row]
@@ -177,23 +185,26 @@ def test_update_equals_new_setup(name: str, recordings: list[Recording]) -> None
         if name in STALLING and Status.SOLVED not in (a.status, b.status):
             continue
         assert a.status is b.status is Status.SOLVED
-        assert objective(data, a.z) == pytest.approx(objective(data, b.z), abs=OBJECTIVE)
+        assert objective(data, a.primal) == pytest.approx(objective(data, b.primal), abs=OBJECTIVE)
 
 
 def test_arrays_given_are_not_changed(recordings: list[Recording]) -> None:
     recording = recordings[0]
-    qp = recording.qps[30]
-    assert qp.z is not None
-    assert qp.y is not None
-    kept = [a.copy() for a in (qp.data.q, qp.data.a_data, qp.data.lower, qp.data.upper, qp.z, qp.y)]
+    qp = recording.solves[30]
+    assert qp.primal is not None
+    assert qp.dual is not None
+    kept = [
+        a.copy()
+        for a in (qp.data.q, qp.data.a_data, qp.data.lower, qp.data.upper, qp.primal, qp.dual)
+    ]
     for name in solver_names():
         solver = make_solver(name)
         solver.setup(recording.structure, qp.data)
-        first = solver.solve(qp.data, qp.z, qp.y)
-        z = first.z.copy()
-        solver.solve(recording.qps[60].data, None, None)
-        np.testing.assert_array_equal(first.z, z)
-    now = (qp.data.q, qp.data.a_data, qp.data.lower, qp.data.upper, qp.z, qp.y)
+        first = solver.solve(qp.data, qp.primal, qp.dual)
+        z = first.primal.copy()
+        solver.solve(recording.solves[60].data, None, None)
+        np.testing.assert_array_equal(first.primal, z)
+    now = (qp.data.q, qp.data.a_data, qp.data.lower, qp.data.upper, qp.primal, qp.dual)
     for before, after in zip(kept, now, strict=True):
         np.testing.assert_array_equal(before, after)
 
@@ -201,8 +212,8 @@ def test_arrays_given_are_not_changed(recordings: list[Recording]) -> None:
 def test_times_are_apart(recordings: list[Recording]) -> None:
     for name in solver_names():
         solver = make_solver(name)
-        solver.setup(recordings[0].structure, recordings[0].qps[5].data)
-        found = solver.solve(recordings[0].qps[6].data, None, None)
+        solver.setup(recordings[0].structure, recordings[0].solves[5].data)
+        found = solver.solve(recordings[0].solves[6].data, None, None)
         assert found.solve_s > 0.0
         assert found.update_s > 0.0
 

@@ -1,33 +1,45 @@
 """OSQP as it is used here: fixed arithmetic, no surprises after a bad problem."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from qpmpc.controllers.factory import ControllerSettings, make_controller
-from qpmpc.controllers.mh_qp import MhQp
-from qpmpc.cycles import load_cycle
-from qpmpc.preview import Trace
-from qpmpc.solvers import Osqp, OsqpSettings, Status
-from qpmpc.vehicle import Plant, load_vehicle
+from qpmpc.controllers.qp_planner import QpPlanner
+from qpmpc.controllers.receding_horizon import RecedingHorizon
+from qpmpc.controllers.settings import ControllerSettings
+from qpmpc.qp.stage_qp import QpData, StageQp
+from qpmpc.registry import make_controller
+from qpmpc.solvers import AdmmSettings, Status
+from qpmpc.solvers.osqp import Osqp
+from qpmpc.trip import Trip
+from qpmpc.vehicle import PlantState
+
+
+class Recorded(NamedTuple):
+    qp: StageQp
+    data: QpData
 
 
 @pytest.fixture(scope="module")
-def recorded():
-    """A planner after its departure on NYCC, with the data of its first QP."""
-    plant = Plant(load_vehicle())
-    truth = Trace.of(load_cycle("nycc"), plant.vehicle)
+def recorded() -> Recorded:
+    """The QP of a planner after its departure on NYCC, with the data of its first second."""
+    trip, solves = Trip("nycc"), []
     settings = ControllerSettings().with_settings({"mh_qp.implementation": "python"})
-    controller = make_controller("mh-qp", plant, truth, settings=settings)
-    assert isinstance(controller, MhQp)
-    controller.planner.solve(0, 0.6, 50.0)
-    return controller.planner
+    controller = make_controller("mh-qp", trip, settings)
+    assert isinstance(controller, RecedingHorizon)
+    planner = controller.planner
+    assert isinstance(planner, QpPlanner)
+    planner.on_solve = solves.append
+    planner.depart(trip.start)
+    planner.solve(trip.observation(0, PlantState(0.6, 50.0)))
+    return Recorded(planner.qp, solves[-1].data)
 
 
-def _fresh(planner, **settings):
-    solver = Osqp(OsqpSettings(**settings))
-    solver.setup(planner.qp.structure, planner.data)
+def _fresh(recorded, **settings):
+    solver = Osqp(AdmmSettings(**settings))
+    solver.setup(recorded.qp.structure, recorded.data)
     return solver
 
 
@@ -41,8 +53,8 @@ def test_every_solve_runs_exactly_k_iterations(recorded):
 def test_same_input_same_bits(recorded):
     a = _fresh(recorded).solve(recorded.data, None, None)
     b = _fresh(recorded).solve(recorded.data, None, None)
-    np.testing.assert_array_equal(a.z, b.z)
-    np.testing.assert_array_equal(a.y, b.y)
+    np.testing.assert_array_equal(a.primal, b.primal)
+    np.testing.assert_array_equal(a.dual, b.dual)
 
 
 def test_the_callers_arrays_are_left_alone(recorded):
@@ -69,7 +81,7 @@ def test_infeasible_is_not_usable_and_does_not_poison_the_next_solve(recorded):
     assert not bad.usable
     again = solver.solve(data, None, None, cold=True)
     assert again.usable
-    np.testing.assert_allclose(again.z, good.z, atol=1e-9)
+    np.testing.assert_allclose(again.primal, good.primal, atol=1e-9)
 
 
 @pytest.mark.parametrize("field", ["q", "a_data", "lower", "upper"])
@@ -83,4 +95,4 @@ def test_nan_and_crossed_bounds_are_refused_and_forgotten(recorded, field):
     crossed = solver.solve(replace(data, lower=data.upper + 1.0), None, None)
     assert crossed.status is Status.FAILED
     expected = _fresh(recorded).solve(data, None, None)
-    np.testing.assert_array_equal(solver.solve(data, None, None).z, expected.z)
+    np.testing.assert_array_equal(solver.solve(data, None, None).primal, expected.primal)

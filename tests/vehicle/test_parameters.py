@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import BaseModel
 
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.errors import InputError
 from qpmpc.settings import parse_setting, parse_settings
 from qpmpc.vehicle import Vehicle, load_vehicle, vehicle_names
@@ -124,8 +124,8 @@ def test_whole_numbers_and_those_of_numpy_are_numbers():
         assert warm.thermal.t_amb_degc == 25.0
     with pytest.raises(InputError, match="given: true"):
         load_vehicle().with_settings({"thermal.t_amb_degc": np.bool_(True)})
-    fewer = ControllerSettings().with_settings({"mh_qp.osqp.iterations": np.int64(25)})
-    assert fewer.mh_qp.osqp.iterations == 25
+    fewer = ControllerSettings().with_settings({"mh_qp.admm.iterations": np.int64(25)})
+    assert fewer.mh_qp.admm.iterations == 25
     resistance = 0.5 * np.array(load_vehicle("prius-liion").battery.resistance_charge_ohm)
     better = load_vehicle("prius-liion").with_settings(
         {"battery.resistance_charge_ohm": resistance}
@@ -135,9 +135,9 @@ def test_whole_numbers_and_those_of_numpy_are_numbers():
 
 def test_settings_of_controllers_are_as_strict():
     for key, wrong in [
-        ("mh_qp.osqp.iterations", True),
-        ("mh_qp.osqp.rho", True),
-        ("mh_qp.osqp.rho", "0.1"),
+        ("mh_qp.admm.iterations", True),
+        ("mh_qp.admm.rho", True),
+        ("mh_qp.admm.rho", "0.1"),
         ("mh_qp.horizon.class_hard_w", math.inf),
         ("mh_qp.prepared", 1),
         ("rule_based.heat_on_degc", math.nan),

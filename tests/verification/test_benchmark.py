@@ -8,7 +8,9 @@ import pytest
 import scipy.sparse as sp
 
 from qpmpc.cycles import Cycle, load_cycle
-from qpmpc.solvers.osqp import Osqp, OsqpSettings
+from qpmpc.solvers import AdmmSettings
+from qpmpc.solvers.osqp import Osqp
+from qpmpc.trip import Trip
 from qpmpc.vehicle import load_vehicle
 from qpmpc.verification.benchmark.benchmark import Benchmark
 from qpmpc.verification.benchmark.candidates import Candidate, candidates
@@ -30,9 +32,8 @@ def short():
 @pytest.fixture(scope="module")
 def driven(short):
     return drive(
-        Candidate("osqp K=20", "osqp, fixed K", {"mh_qp.osqp.iterations": 20}),
-        short,
-        VEHICLE,
+        Candidate("osqp K=20", "osqp, fixed K", {"mh_qp.admm.iterations": 20}),
+        Trip(short, VEHICLE),
         repetitions=2,
     )
 
@@ -48,7 +49,7 @@ def test_every_step_of_every_repetition_is_timed_and_runs_k_iterations(driven, s
 
 def test_a_rival_drives_with_its_own_answers(short):
     rival = next(c for c in candidates() if c.label == "piqp")
-    row = drive(rival, short, VEHICLE, repetitions=1).row(1.0)
+    row = drive(rival, Trip(short, VEHICLE), repetitions=1).row(1.0)
     assert row["fallback_steps"] == 0
     assert row["iterations_max"] < 200  # an interior-point method, not OSQP in disguise
 
@@ -56,7 +57,7 @@ def test_a_rival_drives_with_its_own_answers(short):
 def test_generated_c_is_timed_and_burns_what_osqp_burns(short, driven):
     overrides = driven.candidate.overrides
     generated = Candidate("generated K=20", "generated C, fixed K", overrides, generated=True)
-    again = drive(generated, short, VEHICLE, repetitions=1)
+    again = drive(generated, Trip(short, VEHICLE), repetitions=1)
     assert again.stages == driven.stages
     assert again.solve_ms.shape == again.update_ms.shape == (1, short.steps)
     assert np.all(again.step_ms >= again.solve_ms)
@@ -64,7 +65,7 @@ def test_generated_c_is_timed_and_burns_what_osqp_burns(short, driven):
 
 
 def test_exported_qps_are_the_controllers(short):
-    recording = record(short, VEHICLE)
+    recording = record(Trip(short, VEHICLE))
     with np.load(BytesIO(recorded_npz(recording))) as data:
         steps, n = data["q"].shape
         m = data["lower"].shape[1]
@@ -72,15 +73,15 @@ def test_exported_qps_are_the_controllers(short):
         k = 17
         a = sp.csc_matrix((data["a_data"][k], data["a_indices"], data["a_indptr"]), shape=(m, n))
         # Solving the exported numbers from the exported start gives the next exported start.
-        qp = [q for q in recording.qps if q.z is not None][-steps:][k].data
+        qp = recording.on_the_road[k].data
         np.testing.assert_array_equal(
             recording.structure.matrix_of(qp.a_data).toarray(), a.toarray()
         )
-        solver = Osqp(OsqpSettings())
+        solver = Osqp(AdmmSettings())
         solver.setup(recording.structure, qp)
         solution = solver.solve(qp, data["z_start"][k], data["y_start"][k])
         assert solution.usable
-        product = a @ solution.z
+        product = a @ solution.primal
         assert np.all(product <= data["upper"][k] + 0.1)
         assert np.all(product >= data["lower"][k] - 0.1)
 

@@ -8,15 +8,13 @@ import pytest
 
 import qpmpc.verification.renderings.equivalence
 from qpmpc.codegen.host_library import compiler
-from qpmpc.controllers.factory import ControllerSettings
-from qpmpc.controllers.mh_qp import MhQp
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.errors import QpmpcError
-from qpmpc.preview import Trace
 from qpmpc.qp import CvxpyTwin, Var
-from qpmpc.simulate import simulate
-from qpmpc.vehicle import Plant, Vehicle, load_vehicle
-from qpmpc.verification.benchmark.recorder import RecordingSolver
+from qpmpc.trip import Trip
+from qpmpc.vehicle import Vehicle, load_vehicle
+from qpmpc.verification.benchmark.recorder import record
 from qpmpc.verification.renderings.cvxpy_matrices import cvxpy_matrices
 from qpmpc.verification.renderings.equivalence import Renderings, check_equivalence
 from qpmpc.verification.renderings.generated_qp import READ
@@ -40,12 +38,11 @@ def made(
 ) -> tuple[Renderings, list[QpCase]]:
     """Renderings of a trip with its departure and two cases that no trip meets."""
     settings = ControllerSettings().with_settings(changes or {})
-    cycle = beginning("udds", 250)
-    truth = Trace.of(cycle, vehicle)
-    renderings = Renderings(vehicle, truth, settings)
-    departure = next(recorded_cases(cycle, vehicle, settings, every=250))
+    trip = Trip(beginning("udds", 250), vehicle)
+    renderings = Renderings(trip, settings)
+    departure = next(recorded_cases(trip, settings, every=250))
     stages = renderings.preview.count
-    return renderings, [departure, *random_cases(truth, vehicle, stages, 2, 7)]
+    return renderings, [departure, *random_cases(trip, stages, 2, 7)]
 
 
 def assert_equal(renderings: Renderings, case: QpCase) -> None:
@@ -58,7 +55,7 @@ def assert_equal(renderings: Renderings, case: QpCase) -> None:
 
 
 def test_recorded_and_random_cases() -> None:
-    equivalence = check_equivalence(beginning("nycc", 150), VEHICLE, every=30, random=7)
+    equivalence = check_equivalence(Trip(beginning("nycc", 150), VEHICLE), every=30, random=7)
     assert equivalence.to_dict()["cases"] == 12
     worst = equivalence.worst()
     assert set(worst) == ALL
@@ -69,16 +66,10 @@ def test_recorded_and_random_cases() -> None:
 
 def test_recorded_cases_are_the_qps_of_the_road() -> None:
     """Made again from state and plan, they are bit for bit what `mh-qp` gave its solver."""
-    cycle, settings = beginning("nycc", 60), ControllerSettings()
-    plant, truth = Plant(VEHICLE), Trace.of(cycle, VEHICLE)
-    recorder = RecordingSolver(qpmpc.solvers.Osqp(settings.mh_qp.osqp))
-    driver = MhQp(
-        "mh-qp", plant, truth, truth, settings.mh_qp, settings.rule_based, solver=recorder
-    )
-    simulate(cycle, driver, VEHICLE)
-    solved = [qp.data for qp in recorder.qps[-cycle.steps :]]
-    renderings = Renderings(VEHICLE, truth, settings)
-    cases = list(recorded_cases(cycle, VEHICLE, settings, every=7))
+    trip, settings = Trip(beginning("nycc", 60), VEHICLE), ControllerSettings()
+    solved = [qp.data for qp in record(trip, settings).on_the_road]
+    renderings = Renderings(trip, settings)
+    cases = list(recorded_cases(trip, settings, every=7))
     assert [case.seen.step for case in cases] == list(range(0, 60, 7))
     for case in cases:
         data, theirs = renderings.qp.update(*renderings.inputs(case)), solved[case.seen.step]

@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.qp.structure import QpStructure
 from qpmpc.solvers import make_solver
+from qpmpc.trip import Trip
 from qpmpc.vehicle import load_vehicle
 from qpmpc.verification.benchmark.export import write_qps
 from qpmpc.verification.benchmark.problem_set import Problem, problem_set
@@ -57,7 +58,7 @@ def recording() -> Recording:
     nycc = load_cycle("nycc")
     inside = slice(60, 60 + STEPS + 1)
     trip = Cycle("short", np.arange(STEPS + 1.0), nycc.speed_mps[inside], np.zeros(STEPS + 1))
-    return record(trip, VEHICLE)
+    return record(Trip(trip, VEHICLE))
 
 
 @pytest.fixture(scope="module")
@@ -121,14 +122,14 @@ def test_set_holds_what_can_be_solved(test_set, problems) -> None:
 
 def test_optima_are_those_of_the_controller(test_set, recording, problems) -> None:
     """Solved from the exported form, by another solver, they cost what ours cost."""
-    steps = [qp.data for qp in recording.qps[-STEPS:]]
+    steps = [qp.data for qp in recording.on_the_road]
     ours = {f"short: step {k}": (recording.structure, steps[k]) for k in range(0, STEPS, 20)}
     ours |= {f"problem_set: {p.name}": (p.structure, p.data) for p in problems}
     for problem in test_set:
         structure, data = ours[problem.name]
         solver = make_solver("piqp", 1e-9)
         solver.setup(structure, data)
-        best = objective(data, solver.solve(data, None, None).z)
+        best = objective(data, solver.solve(data, None, None).primal)
         found = qpsolvers.solve_problem(problem, "clarabel")
         assert found.found, problem.name
         assert found.obj == pytest.approx(best, abs=1e-5 * (1.0 + abs(best))), problem.name

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from qpmpc.controllers.base import Decision
-from qpmpc.controllers.safety import SafetyLayer
+from qpmpc.controllers.base import Controller
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.errors import InputError
-from qpmpc.runners import run
-from qpmpc.simulate import simulate
+from qpmpc.simulation import simulate
+from qpmpc.trip import Trip
 from qpmpc.vehicle import Command, Plant, load_vehicle
 from qpmpc.verification.bounds.lower_bound import lower_bound, stored_energy_j
 from qpmpc.verification.bounds.relaxed_trip import relaxed_trip
@@ -29,20 +28,20 @@ def bound(trip):
     return lower_bound(trip, VEHICLE)
 
 
-class Dice:
+class Dice(Controller):
     """Throws engine state and power anew every few seconds; the safety layer keeps the limits."""
 
-    name, solver_name = "dice", ""
+    name = "dice"
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, trip: Trip, seed: int) -> None:
+        super().__init__(trip)
         self._dice = np.random.default_rng(seed)
-        self._safety = SafetyLayer(Plant(VEHICLE))
         self._wish = Command(False, 0.0)
 
-    def decide(self, seen) -> Decision:
+    def step(self, seen) -> Command:
         if seen.step % 7 == 0:
             self._wish = Command(self._dice.random() < 0.3, 25e3 * self._dice.random())
-        return Decision(self._safety.admissible(self._wish, seen))
+        return self._wish
 
 
 def priced_g(finished, bound) -> float:
@@ -53,19 +52,20 @@ def priced_g(finished, bound) -> float:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_no_random_drive_is_below_it(trip, bound, seed):
-    finished = simulate(trip, Dice(seed), VEHICLE)
+    road = Trip(trip, VEHICLE)
+    finished = simulate(road, Dice(road, seed))
     assert not any(finished.summary()["violations"].values())
     assert priced_g(finished, bound) >= bound.fuel_g
 
 
 @pytest.mark.parametrize("name", ["mh-qp", "rule-based", "ecms"])
 def test_no_controller_is_below_it(trip, bound, name):
-    assert priced_g(run(trip, name, VEHICLE), bound) >= bound.fuel_g
+    assert priced_g(simulate(trip, name, VEHICLE), bound) >= bound.fuel_g
 
 
 def test_it_is_not_empty_words(trip, bound):
     # On a trip this short one switch of the engine costs more than on a whole cycle.
-    assert bound.fuel_g > 0.95 * priced_g(run(trip, "mh-qp", VEHICLE), bound)
+    assert bound.fuel_g > 0.95 * priced_g(simulate(trip, "mh-qp", VEHICLE), bound)
     assert 0.0 <= bound.numerical_g < 0.01 * bound.fuel_g
 
 

@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from qpmpc.controllers.base import Observation
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.controllers.receding_horizon import RecedingHorizon
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.errors import QpmpcError
-from qpmpc.preview import Trace
-from qpmpc.simulate import simulate
-from qpmpc.vehicle import Plant, Vehicle, load_vehicle
+from qpmpc.simulation import simulate
+from qpmpc.trip import Trip
+from qpmpc.vehicle import PlantState, Vehicle, load_vehicle
 from qpmpc.verification.independent.equations import Equations
 from qpmpc.verification.nonlinear.comparison import compare, compare_open_loop
 from qpmpc.verification.nonlinear.maps import RoundedTable, SmoothMaps
-from qpmpc.verification.nonlinear.mh_nlp import MhNlp, MhNlpSettings, make_mh_nlp
+from qpmpc.verification.nonlinear.mh_nlp import MhNlp, MhNlpSettings
 from qpmpc.verification.nonlinear.problem import NlpVar
 from qpmpc.verification.nonlinear.solver import NlpPlan
 
@@ -41,10 +41,13 @@ def beginning(name: str, steps: int) -> Cycle:
     return Cycle(name, whole.time_s[inside], whole.speed_mps[inside], whole.grade[inside])
 
 
-def controller(cycle: Cycle, vehicle: Vehicle = VEHICLE, on_off: str = "relaxed") -> MhNlp:
+def planner(cycle: Cycle, vehicle: Vehicle = VEHICLE, on_off: str = "relaxed") -> MhNlp:
     chosen = MhNlpSettings.model_validate({"on_off": on_off})
-    truth = Trace.of(cycle, vehicle)
-    return MhNlp(Plant(vehicle), truth, truth, chosen, ControllerSettings().rule_based)
+    return MhNlp(Trip(cycle, vehicle), of_nlp=chosen)
+
+
+def plan_of(nlp: MhNlp, step: int, soc: float, t_cl_degc: float) -> NlpPlan:
+    return nlp.solve(nlp.trip.observation(step, PlantState(soc, t_cl_degc)))
 
 
 @given(st.floats(0.0, 71e3))
@@ -138,9 +141,8 @@ def rolled(vehicle: Vehicle, plan: NlpPlan, soc: float, t_cl: float) -> tuple[fl
 )
 def test_plan_obeys_the_exact_equations(name: str, changes: dict[str, object]) -> None:
     vehicle = VEHICLE.with_settings(changes)
-    plan = controller(beginning(name, 400), vehicle).plan(
-        0, vehicle.trip.soc_init, vehicle.trip.t_cl_init_degc
-    )
+    nlp = planner(beginning(name, 400), vehicle)
+    plan = plan_of(nlp, 0, vehicle.trip.soc_init, vehicle.trip.t_cl_init_degc)
     assert plan.solved
     soc, t_cl, fuel_g = rolled(vehicle, plan, vehicle.trip.soc_init, vehicle.trip.t_cl_init_degc)
     x = plan.x
@@ -155,12 +157,12 @@ def test_plan_obeys_the_exact_equations(name: str, changes: dict[str, object]) -
 
 
 def test_warm_equals_cold() -> None:
-    driver = controller(beginning("nycc", 300))
+    nlp = planner(beginning("nycc", 300))
     for step, soc, t_cl_degc in ((50, 0.6, 48.0), (150, 0.62, 52.0), (250, 0.59, 45.0)):
         for before in range(step - 2, step):
-            driver.plan(before, soc, t_cl_degc)
-        cold = driver.solver.solve(driver.preview.at(step), soc, t_cl_degc)
-        warm = driver.plan(step, soc, t_cl_degc)
+            plan_of(nlp, before, soc, t_cl_degc)
+        cold = nlp.solver.solve(nlp.preview.at(step), soc, t_cl_degc)
+        warm = plan_of(nlp, step, soc, t_cl_degc)
         assert warm.solved
         assert cold.solved
         assert warm.cost_g == pytest.approx(cold.cost_g, abs=1e-3)
@@ -169,14 +171,14 @@ def test_warm_equals_cold() -> None:
 def test_price_makes_short_stages_integral() -> None:
     """Where the relaxed on-share is fractional, the homotopy takes it to 0 or 1, at a price."""
     cycle = beginning("hwfet", 300)
-    relaxed, priced = controller(cycle), controller(cycle, on_off="homotopy")
+    relaxed, priced = planner(cycle), planner(cycle, on_off="homotopy")
     tried = 0
     for step in range(0, 300, 3):
-        before = relaxed.plan(step, 0.6, 55.0)
+        before = plan_of(relaxed, step, 0.6, 55.0)
         share = before.z[:5, NlpVar.ON]
         if np.all(np.minimum(share, 1.0 - share) < 0.1):
             continue
-        after = priced.plan(step, 0.6, 55.0)
+        after = plan_of(priced, step, 0.6, 55.0)
         end = after.z[:5, NlpVar.ON]
         assert np.minimum(end, 1.0 - end).max() < np.minimum(share, 1.0 - share).max()
         assert after.cost_g > before.cost_g - 1e-3
@@ -199,8 +201,7 @@ def test_price_makes_short_stages_integral() -> None:
 def test_closed_loop(changes: dict[str, object]) -> None:
     """It drives from any corner, without help, and within limits that it did not start beyond."""
     vehicle, cycle = VEHICLE.with_settings(changes), beginning("udds", 200)
-    plant, truth = Plant(vehicle), Trace.of(cycle, vehicle)
-    summary = simulate(cycle, make_mh_nlp(plant, truth), vehicle).summary()
+    summary = simulate(cycle, MhNlp, vehicle).summary()
     assert summary["controller"] == "mh-nlp"
     assert summary["solver"]["name"] == "ipopt"
     assert summary["fallback_steps"] == 0
@@ -211,28 +212,26 @@ def test_closed_loop(changes: dict[str, object]) -> None:
 
 
 def test_ladder() -> None:
-    cycle = beginning("nycc", 60)
-    driver = controller(cycle)
-    truth = Trace.of(cycle, VEHICLE)
-    solve = driver.solver.solve
+    nlp = planner(beginning("nycc", 60))
+    driver = RecedingHorizon(nlp.trip, nlp)
+    solve = nlp.solver.solve
 
-    def observe(step: int) -> Observation:
-        demand, speed = float(truth.demand_w[step]), float(truth.speed_mps[step])
-        return Observation(step, 0.6, 50.0, False, demand, speed)
+    def rung(step: int) -> str:
+        return driver.decide(nlp.trip.observation(step, PlantState(0.6, 50.0))).fallback
 
-    assert driver.decide(observe(0)).fallback == ""
-    driver.solver.solve = (  # type: ignore[method-assign]
+    assert rung(0) == ""
+    nlp.solver.solve = (  # type: ignore[method-assign]
         lambda *given, **named: replace(solve(*given, **named), solved=False)
     )
-    rungs = [driver.decide(observe(step)).fallback for step in range(1, 7)]
+    rungs = [rung(step) for step in range(1, 7)]
     assert rungs == ["shifted plan"] * 3 + ["rule-based"] * 3
-    driver.solver.solve = solve  # type: ignore[method-assign]
-    assert driver.decide(observe(7)).fallback == ""
+    nlp.solver.solve = solve  # type: ignore[method-assign]
+    assert rung(7) == ""
 
 
 def test_comparison() -> None:
     cycle = beginning("nycc", 200)
-    comparison = compare([cycle], VEHICLE, every=10)
+    comparison = compare([Trip(cycle, VEHICLE)], every=10)
     result = json.loads(json.dumps(comparison.to_dict()))
     (open_loop,), (closed_loop,) = result["open_loop"], result["closed_loop"]
     assert open_loop["states"] == 20
@@ -247,11 +246,10 @@ def test_comparison() -> None:
 
 
 def test_comparison_notices_a_coarse_model() -> None:
-    cycle = beginning("nycc", 60)
+    trip = Trip(beginning("nycc", 60), VEHICLE)
     coarse = ControllerSettings().with_settings({"mh_qp.pwa.fuel_g_per_s": 0.2})
     fine_plan, coarse_plan = (
-        compare_open_loop(cycle, VEHICLE, every=60, settings=chosen).pairs[0]
-        for chosen in (None, coarse)
+        compare_open_loop(trip, every=60, settings=chosen).pairs[0] for chosen in (None, coarse)
     )
     assert coarse_plan.nlp_fuel_g == pytest.approx(fine_plan.nlp_fuel_g, rel=1e-6)
     fine, rough = (abs(p.qp_fuel_g - p.nlp_fuel_g) for p in (fine_plan, coarse_plan))

@@ -15,13 +15,13 @@ import numpy as np
 import pytest
 
 import qpmpc.codegen.values
+import qpmpc.controllers.receding_horizon
 import qpmpc.preview.forecast
 import qpmpc.preview.stages
 import qpmpc.pwa.model
 import qpmpc.qp.stage_qp
 from qpmpc.codegen.host_library import compiler
-from qpmpc.controllers.factory import ControllerSettings
-from qpmpc.controllers.mh_qp import MhQp
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.preview.forecast import Trace
 from qpmpc.preview.stages import StageBuilder
@@ -29,13 +29,14 @@ from qpmpc.qp.cvxpy_twin import CvxpyTwin
 from qpmpc.qp.scaling import Scaling
 from qpmpc.qp.stage_qp import StageQp
 from qpmpc.qp.structure import QpStructure
+from qpmpc.registry import CHECKS
 from qpmpc.solvers.forms import OneSided
 from qpmpc.solvers.osqp import Osqp
 from qpmpc.solvers.qoco import Qoco
+from qpmpc.trip import Trip
 from qpmpc.vehicle import Plant
 from qpmpc.vehicle.engine import OptimalLine
 from qpmpc.verification.checks import (
-    GROUPS,
     Context,
     Group,
     backend_checks,
@@ -252,8 +253,8 @@ MUTATIONS = [
         "l=data.lower, u=data.upper, ", "", (limits_kept, relaxation_tight, warm_start_shifted),
     ),
     Mutation(
-        "engine on whatever the share", MhQp, "_realise",
-        "if sigma < ON_THRESHOLD", "if sigma < 0.0",
+        "engine on whatever the share", qpmpc.controllers.receding_horizon, "_at",
+        "if plan.on_share[second] < ON_THRESHOLD", "if plan.on_share[second] < 0.0",
         (limits_kept, bound_below_everything, relaxation_tight),
     ),
 ]  # fmt: skip
@@ -291,7 +292,8 @@ def mutate(monkeypatch: pytest.MonkeyPatch, mutation: Mutation) -> None:
 def test_mutation_is_caught(monkeypatch, mutation):
     if mutation.owner is qpmpc.codegen.values and compiler() is None:
         pytest.skip("no C compiler on this machine")
-    quick = [check for group in GROUPS if group.quick for check in group.checks]
+    groups = [CHECKS.find(name) for name in CHECKS.names()]
+    quick = [check for group in groups if group.quick for check in group.checks]
     assert set(mutation.checks) <= set(quick)
     mutate(monkeypatch, mutation)
     monkeypatch.setattr(generated_qp, "SLICES", 10)  # what is wrong may never converge
@@ -310,8 +312,8 @@ def test_the_product_as_it_is_passes_the_same_checks():
     ("changes", "failing"),
     [
         ({}, set()),
-        ({"mh_qp.osqp.iterations": 2}, {"Fuel beside mh-nlp"}),
-        ({"mh_qp.osqp.iterations": 3000}, {"Time beside mh-nlp"}),
+        ({"mh_qp.admm.iterations": 2}, {"Fuel beside mh-nlp"}),
+        ({"mh_qp.admm.iterations": 3000}, {"Time beside mh-nlp"}),
     ],
 )
 def test_closed_loops_beside_the_nonlinear_program(monkeypatch, changes, failing):
@@ -319,7 +321,7 @@ def test_closed_loops_beside_the_nonlinear_program(monkeypatch, changes, failing
     whole, part = load_cycle("nycc"), slice(60, 181)
     short = Cycle("short", np.arange(121.0), whole.speed_mps[part], whole.grade[part])
     monkeypatch.setattr(nlp_checks, "cycle_names", lambda: ("short",))
-    monkeypatch.setattr(nlp_checks, "load_cycle", lambda name: short)
+    monkeypatch.setattr(Context, "trip", lambda self, _: Trip(short, self.vehicle))
     context = Context(quick=False)
     context.settings = ControllerSettings().with_settings(changes)
     found = list(run_checks(Group("", (against_the_nonlinear_program,)), context))

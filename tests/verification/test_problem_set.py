@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from qpmpc.solvers import Osqp, QpSolver, Status, make_solver, solver_names
+from qpmpc.solvers import QpSolver, Status, make_solver, solver_names
 from qpmpc.solvers.feasibility import is_infeasible
+from qpmpc.solvers.osqp import Osqp
 from qpmpc.vehicle import load_vehicle
 from qpmpc.verification.benchmark.problem_set import Problem, problem_set
 from qpmpc.verification.checks.backend_checks import AGREE, CYCLING, LOOSE, TO_THE_END
@@ -48,7 +49,7 @@ def test_degenerate_ones_are(problems) -> None:
         best = solved("piqp", problem, 1e-9)
         assert best.status is Status.SOLVED, problem.name
         a = structure.matrix_of(data.a_data).toarray()
-        row = a @ best.z
+        row = a @ best.primal
         active = (np.abs(row - data.lower) < ACTIVE) | (np.abs(row - data.upper) < ACTIVE)
         values = np.linalg.svd(a[active], compute_uv=False)
         dependent = int(active.sum() - (values > 1e-9 * values[0]).sum())
@@ -73,7 +74,7 @@ def test_backend(name: str, problems) -> None:
         if name in CYCLING and not found.usable:
             continue
         assert found.usable, problem.name
-        best = objective(problem.data, solved("piqp", problem, 1e-9).z)
-        assert objective(problem.data, found.z) == pytest.approx(
+        best = objective(problem.data, solved("piqp", problem, 1e-9).primal)
+        assert objective(problem.data, found.primal) == pytest.approx(
             best, abs=loose * (1.0 + abs(best))
         ), problem.name

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.vehicle import load_vehicle
 from qpmpc.verification.reproduction import Extent, Study, job_count, paper, run_study
 from qpmpc.verification.reproduction.checks import checks_of

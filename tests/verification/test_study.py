@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import load_cycle
 from qpmpc.vehicle import load_vehicle
 from qpmpc.verification.study.__main__ import markdown

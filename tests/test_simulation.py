@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from qpmpc.controllers.factory import ControllerSettings, controller_names
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle
 from qpmpc.errors import InputError
-from qpmpc.runners import check_names, run, run_names
+from qpmpc.registry import CONTROLLERS, PLANNERS, check_controllers, controller_names
+from qpmpc.simulation import simulate
 from qpmpc.vehicle import load_vehicle
 from qpmpc.verification.dynamic_programming import DpSettings, solve_dp
 
@@ -18,20 +19,20 @@ def trip() -> Cycle:
 
 
 def test_every_controller_can_be_run_and_the_default_is_first():
-    assert run_names()[0] == "mh-qp"
-    assert set(controller_names()) < set(run_names())
-    assert "dp" in run_names()
-    check_names(run_names())
+    assert controller_names()[0] == "mh-qp"
+    assert set(controller_names()) == {*CONTROLLERS.names(), *PLANNERS.names()}
+    assert "dp" in controller_names()
+    check_controllers(controller_names())
 
 
 def test_unknown_name(trip):
     with pytest.raises(InputError, match=r"'pid'.*mh-qp.*dp"):
-        run(trip, "pid", load_vehicle())
+        simulate(trip, "pid", load_vehicle())
 
 
 def test_progress_reaches_the_end(trip):
     seen: list[tuple[int, int]] = []
-    run(trip, "rule-based", load_vehicle(), progress=lambda *done: seen.append(done))
+    simulate(trip, "rule-based", load_vehicle(), progress=lambda *done: seen.append(done))
     assert seen[-1] == (trip.steps, trip.steps)
 
 
@@ -40,7 +41,8 @@ def test_plan_of_dynamic_programming_is_replayed_exactly(trip, tmp_path, monkeyp
     monkeypatch.setenv("QPMPC_CACHE_DIR", str(tmp_path))
     vehicle, coarse = load_vehicle(), DpSettings(soc_step=0.01, power_step_w=2000.0)
     plan = solve_dp(trip, vehicle, coarse)
-    replayed = run(trip, "dp", vehicle, ControllerSettings(dp=coarse))
+    settings = ControllerSettings().with_section("dp", coarse)
+    replayed = simulate(trip, "dp", vehicle, settings=settings)
     assert replayed.controller == "dp"
     np.testing.assert_allclose(replayed.trajectory.soc, plan.soc, atol=1e-9)
     np.testing.assert_allclose(replayed.trajectory.t_cl_degc, plan.t_cl_degc, atol=1e-6)
