@@ -9,7 +9,7 @@ import pytest
 from qpmpc.report.trajectory_csv import COLUMNS, trajectory_csv
 
 DIMENSIONLESS = {
-    "soc", "engine_on", "iterations", "relaxation_gap", "sigma", "fallback",
+    "soc", "engine_on", "iterations", "relaxation_gap", "on_share", "fallback",
 }  # fmt: skip
 UNITS = ("_s", "_mps", "_w", "_g", "_degc")
 
@@ -34,7 +34,7 @@ def test_a_row_a_second_and_the_final_state(table, runs):
     }
 
 
-@pytest.mark.parametrize("name", ["soc", "t_cl_degc", "p_eng_w", "p_bat_w", "fuel_g", "sigma"])
+@pytest.mark.parametrize("name", ["soc", "t_cl_degc", "p_eng_w", "p_bat_w", "fuel_g", "on_share"])
 def test_numbers_read_back_exactly(table, runs, name):
     truth = getattr(runs[1].trajectory, name)
     read = np.array([float(row[name]) for row in table[: len(truth)]])
@@ -51,4 +51,4 @@ def test_powers_balance(table, runs):
 
 def test_figures_that_a_controller_lacks_are_empty(runs):
     rules = list(csv.DictReader(StringIO(trajectory_csv(runs[0]))))
-    assert {row["sigma"] for row in rules} == {""}
+    assert {row["on_share"] for row in rules} == {""}
