@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.codegen.generate import Precision
-from qpmpc.codegen.host_library import VARS, HostLibrary, build_host_library
+from qpmpc.codegen.host_library import HostLibrary, build_host_library
 from qpmpc.codegen.values import values_of
 from qpmpc.controllers.base import Decision, Observation
 from qpmpc.controllers.factory import ControllerSettings
 from qpmpc.preview.forecast import Trace
 from qpmpc.preview.stages import StageBuilder
+from qpmpc.qp.rows import VARS
 from qpmpc.vehicle.plant import Command, Plant
 
 Floats = NDArray[np.float64]
@@ -98,7 +99,7 @@ class GeneratedController:
             RUNGS[out.rung],
             out.iterations,
             out.relaxation_gap if planned else float("nan"),
-            out.sigma if planned else float("nan"),
+            out.on_share if planned else float("nan"),
         )
 
     def reset(self) -> None:

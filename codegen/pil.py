@@ -166,7 +166,7 @@ class _OnTarget:
         self.commands.append(command)
         self.references.append(self._twin.decide(seen).command)
         planned = out.rung == 0
-        gap, sigma = (out.relaxation_gap, out.sigma) if planned else (np.nan, np.nan)
+        gap, sigma = (out.relaxation_gap, out.on_share) if planned else (np.nan, np.nan)
         return Decision(command, RUNGS[out.rung], out.iterations, gap, sigma)
 
 

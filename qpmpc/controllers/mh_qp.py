@@ -12,9 +12,9 @@ from qpmpc.preview.forecast import Trace
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.preview.stages import StageBuilder
 from qpmpc.pwa.model import PwaModel, PwaTolerances
+from qpmpc.qp.rows import Var
 from qpmpc.qp.scaling import ScalingSettings
 from qpmpc.qp.stage_qp import QpSettings, StageQp
-from qpmpc.qp.structure import Var
 from qpmpc.solvers.base import QpSolver
 from qpmpc.solvers.osqp import Osqp, OsqpSettings
 from qpmpc.vehicle.plant import Command, Plant

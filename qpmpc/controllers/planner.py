@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from qpmpc.preview.stages import StageBuilder, Stages
 from qpmpc.qp.linearisation import Linearisation
+from qpmpc.qp.rows import VARS
 from qpmpc.qp.stage_qp import QpData, StageQp
-from qpmpc.qp.structure import VARS
 from qpmpc.solvers.base import QpSolution, QpSolver
 
 Floats = NDArray[np.float64]

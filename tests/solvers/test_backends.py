@@ -45,7 +45,7 @@ def chosen(recording: Recording) -> list[RecordedQp]:
 def infeasible(recording: Recording) -> QpData:
     """Ask for more charge at the end than the trip allows."""
     structure, data = recording.structure, recording.qps[20].data
-    row = (structure.stages - 1) * structure.rows.count + structure.rows.box_soc
+    row = (structure.stages - 1) * structure.rows.count + structure.rows.first("box_soc")
     lower, upper = data.lower.copy(), data.upper.copy()
     upper[row] = 4.0 * upper[row]
     lower[row] = 0.99 * upper[row]
@@ -157,7 +157,7 @@ def test_update_equals_new_setup(name: str, recordings: list[Recording]) -> None
     recording = recordings[0]
     structure, first = recording.structure, recording.qps[40].data
     second = recording.qps[90].data
-    row = (structure.stages - 1) * structure.rows.count + structure.rows.box_soc
+    row = (structure.stages - 1) * structure.rows.count + structure.rows.first("box_soc")
     fixed = second.lower.copy(), second.upper.copy()
     fixed[1][row] = fixed[0][row]
     open_end = second.upper.copy()

@@ -13,7 +13,7 @@ from qpmpc.controllers.mh_qp import MhQp
 from qpmpc.controllers.planner import Plan
 from qpmpc.cycles import Cycle
 from qpmpc.preview.forecast import Trace
-from qpmpc.qp.structure import Var
+from qpmpc.qp.rows import Var
 from qpmpc.simulate import simulate
 from qpmpc.vehicle.engine import OptimalLine, alpha
 from qpmpc.vehicle.parameters import Vehicle

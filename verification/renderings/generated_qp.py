@@ -11,7 +11,7 @@ from qpmpc.codegen.generate import project_files
 from qpmpc.codegen.host_library import HostLibrary, compiled
 from qpmpc.codegen.values import Values
 from qpmpc.controllers.base import Observation
-from qpmpc.qp.structure import VARS, Var
+from qpmpc.qp.rows import VARS, Var
 from qpmpc.verification.renderings.matrices import Matrices, matrices_from
 
 Floats = NDArray[np.float64]

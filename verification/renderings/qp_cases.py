@@ -11,7 +11,7 @@ from qpmpc.controllers.factory import ControllerSettings
 from qpmpc.controllers.mh_qp import MhQp
 from qpmpc.cycles import Cycle
 from qpmpc.preview.forecast import Trace
-from qpmpc.qp.structure import VARS, Var
+from qpmpc.qp.rows import VARS, Var
 from qpmpc.simulate import simulate
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.plant import Plant
