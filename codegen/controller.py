@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.codegen.generate import Precision
-from qpmpc.codegen.host_library import VARS, build_host_library
+from qpmpc.codegen.host_library import build_host_library
 from qpmpc.codegen.values import values_of
 from qpmpc.controllers.base import Controller, Decision, Progress
 from qpmpc.controllers.settings import ControllerSettings, MhQpSettings
 from qpmpc.preview.stages import StageBuilder
+from qpmpc.qp.rows import VARS
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.plant import Command
 
@@ -140,5 +141,5 @@ def decision_of(out: Any) -> Decision:
         RUNGS[out.rung],
         out.iterations,
         float(out.relaxation_gap) if planned else float("nan"),
-        float(out.sigma) if planned else float("nan"),
+        float(out.on_share) if planned else float("nan"),
     )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from qpmpc._version import __version__
 from qpmpc.codegen.osqp_source import CONSTANT_ARRAYS, PREFIX, osqp_files, osqp_version
+from qpmpc.codegen.rows_solvers import rows_files
 from qpmpc.codegen.values import CONSTANTS, Values
 from qpmpc.errors import InputError
 from qpmpc.files import check_folder, write_text
@@ -92,9 +93,10 @@ def project_files(
     one_of(solver, SOLVERS, "solver")
     root = resources.files("qpmpc.codegen")
     files = {p.name: p.read_text("utf-8") for p in _sorted(root / "runtime")}
+    files |= rows_files(values.scalars, solver)
     of_osqp: dict[str, str] = {}
     if solver == "osqp":
-        del files["mpc_admm.c"]
+        del files["mpc_admm.c"], files["mpc_admm.h"]
         files |= {p.name: p.read_text("utf-8") for p in _sorted(root / "osqp_adapter")}
         of_osqp = osqp_files(values, precision)
     if target == "cortex-m7":
@@ -111,6 +113,7 @@ def project_files(
         "mpc_config.h": "mpc_config.h.j2",
         "mpc_constants.h": "mpc_constants.h.j2",
         "mpc_data.c": "mpc_data.c.j2",
+        "mpc_model.h": "mpc_model.h.j2",
         "Makefile": f"Makefile.{target}.j2",
         "README.md": "README.md.j2",
         "NOTICE": "NOTICE.j2",
@@ -160,7 +163,7 @@ def _context(
         return [", ".join(texts[i : i + VALUES_A_LINE]) for i in cuts]
 
     scalars = {name: literal(value) for name, value in values.scalars.items()}
-    scalars["rule_min_on_s"] = str(values.min_on_s)
+    counts = {"rule_min_on_s": str(values.min_on_s)}
     exponent = values.duration_exponent
     power = f"REAL_POW((duration_s), REAL({-exponent!r}))"
     return {
@@ -177,7 +180,8 @@ def _context(
             (module, [(name, _count_or(literal, value)) for name, value in names.items()])
             for module, names in CONSTANTS.items()
         ],
-        "scalars": sorted(scalars.items()),
-        "arrays": sorted((name, rows(array)) for name, array in values.arrays.items()),
+        "scalars": scalars | counts,
+        "counts": counts,
+        "arrays": {name: rows(array) for name, array in values.arrays.items()},
         "stretch": _STRETCH.get(exponent, power),
     }

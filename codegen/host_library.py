@@ -15,8 +15,9 @@ from qpmpc.codegen.generate import Precision, Solver, project_files
 from qpmpc.codegen.values import Values
 from qpmpc.errors import QpmpcError
 from qpmpc.files import write_text
+from qpmpc.qp.rows import VARS
 
-ABI_VERSION = 1
+ABI_VERSION = 2
 _ABI_NAMES = (
     "version",
     "sizeof real_t",
@@ -31,7 +32,6 @@ _ABI_NAMES = (
     "offset of short_count",
     "offset of engine_on",
 )
-VARS = 7
 # -w: a warning that a new compiler invents must not stop a user; the tests see to warnings
 FLAGS = (
     "-O3 -std=c99 -w -ffp-contract=off -fPIC -shared -Wl,-Bsymbolic "
@@ -73,7 +73,7 @@ def structures(precision: Precision, short: int, long: int) -> tuple[Any, Any]:
     class MpcOut(ctypes.Structure):
         _fields_ = [
             ("p_eng_w", real),
-            ("sigma", real),
+            ("on_share", real),
             ("relaxation_gap", real),
             ("engine_on", ctypes.c_int32),
             ("rung", ctypes.c_int32),

@@ -11,13 +11,12 @@ import scipy.sparse as sp
 
 from qpmpc.codegen.values import Sizes, Values
 from qpmpc.errors import InputError
-from qpmpc.qp.structure import VARS, QpStructure, Rows, Var
+from qpmpc.qp.rows import ROWS, Rows
+from qpmpc.qp.structure import QpStructure
 from qpmpc.solvers.osqp import SAME_WORK
 
 PREFIX = "mpc_osqp_"
 FOLDER = "osqp"
-# Variables of a stage in the order of the C code, see mpc_state.h.
-C_ORDER = (Var.T_SLACK, Var.ON, Var.INTERNAL, Var.FUEL, Var.P_ENG, Var.SOC, Var.T_CL)
 # Arrays that OSQP never writes to: they belong in flash, though it declares them as variables.
 CONSTANT_ARRAYS = (
     "data_P_csc_p",
@@ -88,7 +87,7 @@ def _licence() -> str:
 
 def _set_up(values: Values) -> osqp.OSQP:
     """Set OSQP up with the pattern of the problem; the numbers are replaced every second."""
-    settings = {"rho": values.scalars["rho"], "sigma": values.scalars["sigma"]}
+    settings = {"rho": values.scalars["rho"], "sigma": values.scalars["proximal"]}
     for name, value in settings.items():
         if not np.isclose(float(f"{value:.{DECIMALS}f}"), value, rtol=1e-6, atol=0.0):
             raise InputError(
@@ -98,8 +97,9 @@ def _set_up(values: Values) -> osqp.OSQP:
     pattern = matrix_pattern(values.sizes)
     rows, variables = pattern.shape
     # which rows are equalities must be right: a change refactorises
-    layout = Rows(values.sizes.fuel_pieces, values.sizes.battery_pieces)
-    is_equality = np.isin(np.arange(rows) % layout.count, (layout.soc, layout.t_cl))
+    layout = Rows(fuel=values.sizes.fuel_pieces, battery=values.sizes.battery_pieces)
+    equalities = [layout.first(row.name) for row in ROWS if row.is_equality]
+    is_equality = np.isin(np.arange(rows) % layout.count, equalities)
     solver = osqp.OSQP()
     solver.setup(
         P=sp.identity(variables, format="csc"),
@@ -118,10 +118,7 @@ def _set_up(values: Values) -> osqp.OSQP:
 
 
 def matrix_pattern(sizes: Sizes) -> sp.csc_matrix:
-    """Return A with ones for entries, variables in the order of the C code."""
-    structure = QpStructure(sizes.stages, Rows(sizes.fuel_pieces, sizes.battery_pieces))
-    entries = structure.data(np.ones((sizes.stages, len(structure.entry_row))))
-    order = np.add.outer(np.arange(sizes.stages) * VARS, C_ORDER).ravel()
-    pattern = structure.matrix_of(entries)[:, order].tocsc()
-    pattern.sort_indices()
-    return pattern
+    """Return A with ones for entries."""
+    rows = Rows(fuel=sizes.fuel_pieces, battery=sizes.battery_pieces)
+    structure = QpStructure(sizes.stages, rows)
+    return structure.matrix_of(structure.data(np.ones((sizes.stages, len(structure.index)))))

@@ -11,9 +11,10 @@ from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS
 from qpmpc.controllers.settings import MhQpSettings, RuleBasedSettings
 from qpmpc.errors import InputError
 from qpmpc.pwa.model import PwaModel
-from qpmpc.qp import linearisation, stage_qp
-from qpmpc.qp.coolant import radiator_w_per_k
-from qpmpc.qp.stage_qp import T_CL_MAX_MARGIN_K
+from qpmpc.qp import linearisation, rows, stage_qp
+from qpmpc.qp.quantities import pieces_of
+from qpmpc.qp.rows import Rows
+from qpmpc.qp.stage_qp import qp_parameters
 from qpmpc.solvers import base
 from qpmpc.solvers.settings import AdmmSettings
 from qpmpc.vehicle.battery import BatteryMaps
@@ -43,13 +44,8 @@ CONSTANTS: dict[str, dict[str, float]] = {
         "T_CL_NEAR_K": safety.T_CL_NEAR_K,
         "BISECTIONS": safety.BISECTIONS,
     },
-    stage_qp.__name__: {
-        "SHORTEST_SCALE_S": stage_qp.SHORTEST_SCALE_S,
-        "REACH_MARGIN_SOC": stage_qp.REACH_MARGIN_SOC,
-        "ACCURATE_STAGE_S": stage_qp.ACCURATE_STAGE_S,
-        "SIGMA_FORCED": stage_qp.SIGMA_FORCED,
-        "LEAST_COST": stage_qp.LEAST_COST,
-    },
+    stage_qp.__name__: {"LEAST_COST": stage_qp.LEAST_COST},
+    rows.__name__: {name: value for name, value in vars(rows).items() if isinstance(value, float)},
     base.__name__: {"LARGEST_PLAUSIBLE": base.LARGEST_PLAUSIBLE},
 }
 
@@ -87,7 +83,7 @@ class Sizes:
     @property
     def rows(self) -> int:
         """Rows of a stage."""
-        return 9 + self.fuel_pieces + self.battery_pieces
+        return Rows(fuel=self.fuel_pieces, battery=self.battery_pieces).count
 
 
 @dataclass(frozen=True)
@@ -144,8 +140,9 @@ def values_of(
             "generated code needs a fixed number of blocks: set mh_qp.horizon.blocks to 1 or more"
         )
     scalars = {
+        **qp_parameters(vehicle, model, settings.qp, settings.scaling),
         **_plant(vehicle, line, maps),
-        **_problem(vehicle, model, settings),
+        **_solver(settings.admm),
         **_rules(vehicle, rules),
     }
     if not settings.qp.soc_penalty_g:
@@ -157,10 +154,7 @@ def values_of(
             )
     grid = vehicle.battery.soc_grid
     arrays = {
-        "fuel_slope": model.fuel.slope,
-        "fuel_intercept": model.fuel.intercept,
-        "battery_slope": model.battery.slope,
-        "battery_intercept": model.battery.intercept,
+        **pieces_of(model),
         "alpha_slope": model.alpha.slope,
         "alpha_intercept": model.alpha.intercept,
         "alpha_break": model.alpha.breakpoints[:-1],
@@ -204,54 +198,26 @@ def _array(values: ArrayLike) -> NDArray[np.float64]:
 
 
 def _plant(vehicle: Vehicle, line: OptimalLine, maps: BatteryMaps) -> dict[str, float]:
-    engine, cold, battery, trip = vehicle.engine, vehicle.cold_engine, vehicle.battery, vehicle.trip
-    thermal = vehicle.thermal.model_dump()
+    """Maps of the plant that the QP does not contain; the plan's battery is at the initial SOC."""
+    cold, soc_init = vehicle.cold_engine, vehicle.trip.soc_init
     return {
-        "engine_max_w": engine.power_max_w,
-        "engine_min_w": engine.power_min_w,
-        "lhv_j_per_g": engine.lhv_j_per_g,
-        "fuel_step_w": float(line.power_w[1] - line.power_w[0]),
-        "cold_k": cold.k,
-        "cold_hot_degc": cold.hot_degc,
-        "cold_span_k": cold.span_k,
-        "cold_exponent": cold.exponent,
-        **{name: float(value) for name, value in thermal.items()},
-        "thermostat_w_per_k": radiator_w_per_k(vehicle.thermal),
+        "fuel_step_w": float(line.power_w[1] - line.power_w[0]),  # grid of fuel_g_per_s, from 0
+        **{f"cold_{name}": float(value) for name, value in cold.model_dump().items()},
         "charge_c": maps.charge_c,
-        "battery_discharge_max_w": battery.power_discharge_max_w,
-        "battery_charge_max_w": battery.power_charge_max_w,
-        "soc_min": battery.soc_min,
-        "soc_max": battery.soc_max,
-        "aux_power_w": battery.aux_power_w,
-        "soc_init": trip.soc_init,
-        "t_cl_init_degc": trip.t_cl_init_degc,
-        "plan_voltage_v": maps.open_circuit.at(trip.soc_init),
-        "plan_resistance_discharge_ohm": maps.discharge.at(trip.soc_init),
-        "plan_resistance_charge_ohm": maps.charge.at(trip.soc_init),
+        "aux_power_w": vehicle.battery.aux_power_w,
+        "t_cl_init_degc": vehicle.trip.t_cl_init_degc,
+        "plan_voltage_v": maps.open_circuit.at(soc_init),
+        "plan_resistance_discharge_ohm": maps.discharge.at(soc_init),
+        "plan_resistance_charge_ohm": maps.charge.at(soc_init),
     }
 
 
-def _problem(vehicle: Vehicle, model: PwaModel, settings: MhQpSettings) -> dict[str, float]:
-    qp, units, admm = settings.qp, settings.scaling, settings.admm
-    battery, thermal, soc_init = vehicle.battery, vehicle.thermal, vehicle.trip.soc_init
+def _solver(admm: AdmmSettings) -> dict[str, float]:
     return {
-        "battery_energy_j": model.battery_energy_j,
-        "soc_reserve": qp.soc_reserve * max(soc_init - battery.soc_min, 0.0),
-        "terminal_soc_low": max(qp.terminal_low * soc_init, battery.soc_min),
-        "terminal_soc_high": min(qp.terminal_high * soc_init, battery.soc_max),
-        "soc_penalty_g": qp.soc_penalty_g,
-        "t_min_degc": thermal.t_cl_min_degc + qp.t_cl_margin_k,
-        "t_max_degc": thermal.t_cl_max_degc - T_CL_MAX_MARGIN_K,
-        "slack_g_per_k": qp.slack_g_per_k,
-        "regularisation": qp.regularisation,
-        "unit_soc": units.energy_j / model.battery_energy_j,
-        "unit_t_k": units.t_cl_k,
-        "unit_power_w": units.power_w,
-        "unit_fuel_g_per_s": units.fuel_g_per_s,
         "rho": admm.rho,
         "inverse_rho": 1.0 / admm.rho,
         "rho_equality": admm.rho * EQUALITY_RHO_FACTOR,
-        "sigma": admm.proximal_weight,
+        "proximal": admm.proximal_weight,
         "relaxation": admm.relaxation,
     }
 

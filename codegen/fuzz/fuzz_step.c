@@ -27,7 +27,7 @@ static void check(const mpc_in *in, const mpc_out *out, int32_t flags)
     fine &= (out->rung >= MPC_OPTIMISED) && (out->rung <= MPC_RULES);
     fine &= (out->flags == flags) && ((flags & ~all) == 0);
     fine &= (out->rung != MPC_OPTIMISED) || (flags == 0);
-    fine &= (out->sigma * (real_t)0 == (real_t)0);          /* neither infinite nor NaN */
+    fine &= (out->on_share * (real_t)0 == (real_t)0);          /* neither infinite nor NaN */
     fine &= (out->relaxation_gap * (real_t)0 == (real_t)0);
     if (!fine) {
         abort();

@@ -63,7 +63,7 @@ enum {
 
 typedef struct {
     real_t p_eng_w;        /* engine power; 0 with the engine off */
-    real_t sigma;          /* planned on-share of the coming second; 0 if there is no new plan */
+    real_t on_share;       /* planned on-share of the coming second; 0 if there is no new plan */
     real_t relaxation_gap; /* relative slack of the relaxed curves; 0 if there is no new plan */
     int32_t engine_on;     /* 0 or 1 */
     int32_t rung;
@@ -86,14 +86,13 @@ int32_t mpc_depart(mpc_state *state, const mpc_in *in);
 int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out);
 
 /* Copy the last solution in SI units, for diagnosis: MPC_STAGES rows of MPC_VARS variables in the
- * order soc, t_cl_degc, p_eng_w, on, fuel_g_per_s, internal_w, t_slack_k, and MPC_STAGES rows of
- * MPC_ROWS duals (g of fuel per unit). */
+ * order of VAR_SOC and so on, and MPC_STAGES rows of MPC_ROWS duals (g of fuel per unit). */
 void mpc_plan(const mpc_state *state, real_t *x, real_t *duals);
 
 /* Layout of this build, so that a caller in another language can check its own: version of this
  * interface, sizeof real_t, mpc_in, mpc_out, mpc_state, then MPC_SHORT, MPC_LONG, MPC_VARS,
  * MPC_ROWS, MPC_ITERATIONS, offset of mpc_in.short_count, of mpc_out.engine_on. */
-#define MPC_ABI_VERSION 1
+#define MPC_ABI_VERSION 2
 #define MPC_ABI_ENTRIES 12
 int32_t mpc_abi(int32_t entry);
 

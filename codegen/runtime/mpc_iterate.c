@@ -18,7 +18,7 @@ void iterate_clear(mpc_state *state)
         }
     }
     state->origin_soc = REAL(0.0);
-    state->origin_t_degc = REAL(0.0);
+    state->origin_t_cl_degc = REAL(0.0);
 }
 
 /* Short stages move up by 0 or 1 (in equal time); the last keeps its values; long stages keep

@@ -1,4 +1,4 @@
-/* Maps of engine, battery and coolant: tables and closed forms. */
+/* Maps of engine and battery: tables and closed forms. */
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
@@ -54,23 +54,6 @@ real_t map_discharge_limit_w(real_t soc)
     const real_t current = real_min(emptying, most);
     return real_min(mpc_par.battery_discharge_max_w,
                     current * (voltage - (resistance * current)));
-}
-
-real_t map_cabin_w(real_t t_cl_degc)
-{
-    const real_t span = mpc_par.cabin_heat_full_degc - mpc_par.cabin_heat_from_degc;
-    const real_t share = (t_cl_degc - mpc_par.cabin_heat_from_degc) / span;
-    return mpc_par.cabin_heat_w * real_clip(share, REAL(0.0), REAL(1.0));
-}
-
-/* Heat that leaves the coolant: to the air, through the radiator, into the cabin. */
-real_t map_cooling_w(real_t t_cl_degc, real_t speed_mps)
-{
-    const real_t over_k = t_cl_degc - mpc_par.t_amb_degc;
-    const real_t open = (t_cl_degc - mpc_par.thermostat_open_degc) / mpc_par.thermostat_span_k;
-    const real_t air = mpc_par.ua0_w_per_k + (mpc_par.ua1_w_per_k_per_mps * speed_mps);
-    const real_t radiator = real_clip(open, REAL(0.0), REAL(1.0)) * mpc_par.radiator_w_per_k;
-    return ((air + radiator) * over_k) + map_cabin_w(t_cl_degc);
 }
 
 /* Internal power of the battery, l(P) = U (U - sqrt(U^2 - 4 R P)) / (2 R), at the plan's SOC.

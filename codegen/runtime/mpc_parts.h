@@ -9,13 +9,11 @@ typedef struct {
     int32_t engine_on;
 } mpc_command;
 
-/* mpc_maps.c: maps of engine, battery and coolant */
+/* mpc_maps.c: maps of engine and battery */
 real_t map_fuel_g_per_s(real_t p_eng_w);
 real_t map_cold_factor(real_t t_cl_degc);
 real_t map_charge_limit_w(real_t soc);
 real_t map_discharge_limit_w(real_t soc);
-real_t map_cabin_w(real_t t_cl_degc);
-real_t map_cooling_w(real_t t_cl_degc, real_t speed_mps);
 real_t map_planned_internal_w(real_t power_w);
 real_t pwa_alpha(real_t t_cl_degc);
 real_t pwa_alpha_slope(real_t t_cl_degc);
@@ -23,11 +21,11 @@ real_t pwa_battery(real_t power_w);
 
 /* mpc_thermostat.c */
 typedef struct {
-    real_t u; /* K above the thermostat's opening, at the end of a stage */
-    real_t per_heat; /* its derivatives with respect to heat, K/W, and to u at the start */
+    real_t over_k; /* K above the thermostat's opening, at the end of a stage */
+    real_t per_heat; /* its derivatives with respect to heat, K/W, and to over_k at the start */
     real_t per_start;
 } thermostat_end;
-thermostat_end thermostat_step(real_t duration_s, real_t u, real_t heat_w);
+thermostat_end thermostat_step(real_t duration_s, real_t start_k, real_t heat_w);
 
 /* mpc_qp.c: values of the quadratic program */
 void qp_road(mpc_state *state, const mpc_in *in);

@@ -4,6 +4,7 @@
  * word first: power limits of battery and engine; SOC limits; coolant limits.
  */
 #include "mpc_constants.h"
+#include "mpc_heat.h"
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
@@ -29,7 +30,7 @@ static real_t power_for_heat_w(real_t heat_w, real_t t_cl_degc)
 static real_t cooling_limit_w(const mpc_measured *seen)
 {
     const real_t room_k = mpc_par.t_cl_max_degc - T_CL_MARGIN_K - seen->t_cl_degc;
-    const real_t out_w = map_cooling_w(seen->t_cl_degc, seen->speed_mps);
+    const real_t out_w = heat_cooling_w(seen->t_cl_degc, seen->speed_mps);
     /* always computed, so that every step takes the same time */
     const real_t limit_w =
         power_for_heat_w(out_w + (room_k * mpc_par.heat_capacity_j_per_k), seen->t_cl_degc);

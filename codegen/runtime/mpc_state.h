@@ -5,89 +5,13 @@
 #include <stdint.h>
 
 #include "mpc_config.h"
-
-/* Variables of a stage. The order is that of elimination: states last, because only they couple
- * a stage with the next, and before them what no state equation contains. */
-enum {
-    VAR_SLACK = 0,    /* K beyond the coolant limits */
-    VAR_ON = 1,       /* share of the stage with the engine on */
-    VAR_INTERNAL = 2, /* G, mean internal battery power, W */
-    VAR_FUEL = 3,     /* F, mean fuel rate of a hot engine, g/s */
-    VAR_P_ENG = 4,    /* E, mean engine power, W */
-    VAR_SOC = 5,      /* at the end of the stage */
-    VAR_T_CL = 6,     /* degC, at the end of the stage */
-    MPC_VARS = 7
-};
-
-/* Rows of a stage. */
-enum {
-    ROW_SOC = 0,
-    ROW_T_CL = 1,
-    ROW_FUEL = 2,
-    ROW_BATTERY = ROW_FUEL + MPC_FUEL_PIECES,
-    ROW_P_MAX = ROW_BATTERY + MPC_BATTERY_PIECES,
-    ROW_P_MIN = ROW_P_MAX + 1,
-    ROW_BOX_SOC = ROW_P_MAX + 2,
-    ROW_BOX_ON = ROW_P_MAX + 3,
-    ROW_T_MIN = ROW_P_MAX + 4,
-    ROW_T_MAX = ROW_P_MAX + 5,
-    ROW_SLACK = ROW_P_MAX + 6,
-    MPC_ROWS = ROW_P_MAX + 7
-};
-
-/* Matrix rows of a stage; entries in the order named. Rows with one entry are 1 after scaling. */
-typedef struct {
-    real_t soc[3];                          /* soc, soc before, internal */
-    real_t t_cl[4];                         /* t_cl, t_cl before, p_eng, fuel */
-    real_t fuel[MPC_FUEL_PIECES][3];        /* fuel, p_eng, on */
-    real_t battery[MPC_BATTERY_PIECES][3];  /* internal, p_eng, on */
-    real_t p_max[2];                        /* p_eng, on */
-    real_t p_min[2];                        /* p_eng, on */
-    real_t t_min[2];                        /* t_cl, slack */
-    real_t t_max[2];                        /* t_cl, slack */
-} stage_matrix;
-
-/* Bounds other than 0, which the others have: soc = 0, fuel >= 0, p_max <= 0, slack >= 0. */
-typedef struct {
-    real_t t_cl; /* equal */
-    real_t battery_low[MPC_BATTERY_PIECES];
-    real_t p_min_low;
-    real_t soc_low;
-    real_t soc_high;
-    real_t on_low;
-    real_t on_high;
-    real_t t_min_low;
-    real_t t_max_high;
-} stage_bounds;
-
+#include "mpc_rows.h"
 #if !MPC_SOLVER_OSQP
-enum {
-    COUPLED = 2, /* first variable that elimination of the stage before touches */
-    COUPLED_COUNT = 5
-};
-
-/* Factor of a stage: L D L' with unit L, of which only what can differ from 0 is kept. */
-typedef struct {
-    real_t slack_t;                             /* column of slack: t_cl */
-    real_t on[3];                               /* column of on: internal, fuel, p_eng */
-    real_t dense[COUPLED_COUNT][COUPLED_COUNT]; /* below the diagonal, from VAR_INTERNAL on */
-    real_t before_soc[2];                       /* column of soc before: internal, soc */
-    real_t before_t[COUPLED_COUNT];             /* column of t_cl before */
-    real_t inverse_d[MPC_VARS];
-} stage_factor;
+#include "mpc_rows_factor.h"
 #endif
 
 typedef struct {
-    real_t duration_s; /* 0: masked, the stage passes the state on and costs nothing */
-    real_t net_w;
-    real_t speed_mps;
-    real_t internal_off_w; /* of the battery, engine off */
-    /* where the coolant's heat and the thermostat are expanded */
-    real_t about_t_degc; /* of alpha */
-    real_t about_fuel_g_per_s;
-    real_t about_p_eng_w;
-    real_t about_start_degc;
-    real_t about_end_degc;
+    stage_road road;
     stage_matrix a;
     stage_bounds b;
     real_t hessian[MPC_VARS]; /* diagonal */
@@ -131,9 +55,9 @@ typedef struct {
     /* Where SOC and coolant temperature are counted from: the state at the start of the horizon.
      * Small numbers keep the digits of single precision for what the plan changes. */
     real_t origin_soc;
-    real_t origin_t_degc;
+    real_t origin_t_cl_degc;
     real_t cost;                     /* of the solver, in units per g */
-    real_t old_sigma[MPC_SHORT];     /* last usable plan */
+    real_t old_on_share[MPC_SHORT];  /* last usable plan */
     real_t old_p_eng_w[MPC_SHORT];
     int32_t old_age;                 /* steps since then; MPC_NO_PLAN if there is none */
     int32_t phase;

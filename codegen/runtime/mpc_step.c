@@ -130,20 +130,20 @@ static int32_t solve(mpc_state *state, const mpc_in *in)
 static void keep_plan(mpc_state *state)
 {
     for (int32_t k = 0; k < MPC_SHORT; k++) {
-        state->old_sigma[k] = state->stage[k].x[VAR_ON];
+        state->old_on_share[k] = state->stage[k].x[VAR_ON];
         state->old_p_eng_w[k] = state->stage[k].x[VAR_P_ENG];
     }
     state->old_age = 0;
 }
 
-/* On from an on-share of one half up, at the power E / sigma it stands for. */
+/* On from an on-share of one half up, at the power E / on_share it stands for. */
 static mpc_command realise(const mpc_state *state)
 {
-    const real_t sigma = state->old_sigma[state->old_age];
+    const real_t on_share = state->old_on_share[state->old_age];
     mpc_command command = {REAL(0.0), 0};
-    if (sigma >= ON_THRESHOLD) {
+    if (on_share >= ON_THRESHOLD) {
         command.engine_on = 1;
-        command.p_eng_w = state->old_p_eng_w[state->old_age] / real_min(sigma, REAL(1.0));
+        command.p_eng_w = state->old_p_eng_w[state->old_age] / real_min(on_share, REAL(1.0));
     }
     return command;
 }
@@ -169,7 +169,7 @@ int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out)
             out->flags |= MPC_WARMING_UP;
         } else {
             keep_plan(state);
-            out->sigma = state->stage[0].x[VAR_ON];
+            out->on_share = state->stage[0].x[VAR_ON];
             out->relaxation_gap = qp_relaxation_gap(&state->stage[0]);
         }
     }
@@ -184,17 +184,15 @@ int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out)
 
 void mpc_plan(const mpc_state *state, real_t *x, real_t *duals)
 {
-    static const int32_t order[MPC_VARS] = {VAR_SOC,  VAR_T_CL,     VAR_P_ENG, VAR_ON,
-                                            VAR_FUEL, VAR_INTERNAL, VAR_SLACK};
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         const mpc_stage *const stage = &state->stage[k];
         const int32_t in_si = (state->phase == PHASE_DEPARTING) ? 0 : 1;
         for (int32_t i = 0; i < MPC_VARS; i++) {
-            const real_t unit = (in_si != 0) ? REAL(1.0) : stage->column[order[i]];
-            x[(k * MPC_VARS) + i] = stage->x[order[i]] * unit;
+            const real_t unit = (in_si != 0) ? REAL(1.0) : stage->column[i];
+            x[(k * MPC_VARS) + i] = stage->x[i] * unit;
         }
-        x[k * MPC_VARS] += state->origin_soc;
-        x[(k * MPC_VARS) + 1] += state->origin_t_degc;
+        x[(k * MPC_VARS) + VAR_SOC] += state->origin_soc;
+        x[(k * MPC_VARS) + VAR_T_CL] += state->origin_t_cl_degc;
         for (int32_t i = 0; i < MPC_ROWS; i++) {
             const real_t unit = (in_si != 0) ? REAL(1.0) : (stage->row[i] / state->cost);
             duals[(k * MPC_ROWS) + i] = stage->y[i] * unit;

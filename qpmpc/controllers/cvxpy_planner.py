@@ -9,7 +9,7 @@ from qpmpc.preview.stages import StageBuilder
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.cvxpy_twin import CvxpyTwin
 from qpmpc.qp.linearisation import Linearisation
-from qpmpc.qp.structure import Var
+from qpmpc.qp.rows import Var
 from qpmpc.trip import Observation, Trip
 
 

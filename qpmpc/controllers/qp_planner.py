@@ -12,8 +12,8 @@ from qpmpc.errors import InputError
 from qpmpc.preview.stages import StageBuilder, Stages
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.linearisation import Linearisation
+from qpmpc.qp.rows import VARS, Var
 from qpmpc.qp.stage_qp import QpData, StageQp
-from qpmpc.qp.structure import VARS, Var
 from qpmpc.solvers.base import QpSolution, QpSolver
 from qpmpc.solvers.names import make_solver
 from qpmpc.solvers.osqp import Osqp

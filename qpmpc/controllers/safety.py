@@ -2,6 +2,7 @@
 
 from qpmpc.trip import Observation
 from qpmpc.vehicle.engine import alpha_at
+from qpmpc.vehicle.heat import cooling_w
 from qpmpc.vehicle.plant import Command, Plant
 
 SOC_MARGIN = 1e-5  # kept from the lower limit; what a step leads to is known exactly there
@@ -65,11 +66,7 @@ class SafetyLayer:
         room_k = thermal.t_cl_max_degc - T_CL_MARGIN_K - seen.t_cl_degc
         if room_k > T_CL_NEAR_K:
             return self._vehicle.engine.power_max_w
-        out_w = (
-            plant.air_w(seen.t_cl_degc, seen.speed_mps)
-            + plant.radiator_w(seen.t_cl_degc)
-            + plant.cabin_w(seen.t_cl_degc)
-        )
+        out_w = cooling_w(thermal, seen.t_cl_degc, seen.speed_mps)
         storing_w = room_k * thermal.heat_capacity_j_per_k / plant.step_s
         return self._power_for_heat_w(out_w + storing_w, seen.t_cl_degc)
 

@@ -3,9 +3,10 @@
 from typing import TYPE_CHECKING, Any
 
 from qpmpc.qp.linearisation import Linearisation
+from qpmpc.qp.rows import VARS, Rows, Var
 from qpmpc.qp.scaling import Scaling, ScalingSettings
 from qpmpc.qp.stage_qp import QpData, QpSettings, StageQp
-from qpmpc.qp.structure import VARS, QpStructure, Rows, Var
+from qpmpc.qp.structure import QpStructure
 
 if TYPE_CHECKING:
     from qpmpc.qp.cvxpy_twin import CvxpyTwin

@@ -10,17 +10,11 @@ from numpy.typing import NDArray
 from qpmpc.errors import QpmpcError
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
-from qpmpc.qp.coolant import coolant_row
 from qpmpc.qp.linearisation import Linearisation
-from qpmpc.qp.scaling import Scaling
-from qpmpc.qp.stage_qp import (
-    ACCURATE_STAGE_S,
-    REACH_MARGIN_SOC,
-    SIGMA_FORCED,
-    T_CL_MAX_MARGIN_K,
-    QpSettings,
-)
-from qpmpc.qp.structure import VARS, Var
+from qpmpc.qp.quantities import Quantities
+from qpmpc.qp.rows import SIGMA_FORCED, VARS, Var
+from qpmpc.qp.scaling import Scaling, ScalingSettings
+from qpmpc.qp.stage_qp import T_CL_MAX_MARGIN_K, QpSettings, qp_parameters
 from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
@@ -65,6 +59,8 @@ class CvxpyTwin:
     ) -> None:
         self.vehicle, self.model, self.stages = vehicle, model, stages
         self.settings = settings or QpSettings()
+        parameters = qp_parameters(vehicle, model, self.settings, ScalingSettings())
+        self._quantities = Quantities(parameters, vehicle.thermal, model, stages)
         self.variables = {var: cp.Variable(stages, name=var.name.lower()) for var in Var}
         self.start = {
             Var.SOC: cp.Variable(1, name="soc_now"),
@@ -109,7 +105,7 @@ class CvxpyTwin:
         self._soc_low, self._soc_high = each("soc_low"), each("soc_high")
         self._h_alpha = each("h_alpha", nonneg=True)  # h alpha(T^)
         self._h_growth = each("h_growth")  # h alpha'(T^) F^
-        # the coolant's row, see `CoolantRow`
+        # the coolant's row, see `qpmpc.qp.rows`
         self._per_start = each("per_start", nonneg=True)
         self._per_heat = each("per_heat", nonneg=True)
         self._per_fuel = each("per_fuel", nonneg=True)  # per_heat alpha(T^)
@@ -144,7 +140,7 @@ class CvxpyTwin:
         ]
 
     def _coolant(self) -> list[Any]:
-        """Heat balance with its thermostat, expanded (`CoolantRow`), and soft limits."""
+        """Heat balance with its thermostat, expanded (`qpmpc.qp.rows`), and soft limits."""
         th, settings = self.vehicle.thermal, self.settings
         lhv_j_per_g, share = self.vehicle.engine.lhv_j_per_g, 1.0 - th.exhaust_share
         before = self._before(Var.T_CL)
@@ -191,38 +187,25 @@ class CvxpyTwin:
         scaling : the regularisation of `StageQp` is defined in its solver units; with its scaling
             it is the same here, without there is none
         """
-        battery, engine = self.vehicle.battery, self.vehicle.engine
-        h, net_w = stages.duration_s, stages.net_w
-        missing_w = net_w - battery.power_discharge_max_w
         self._soc_now.value, self._t_cl_now.value = soc, t_cl_degc
-        self._h.value, self._net_w.value, self._off_w.value = h, net_w, stages.internal_off_w
-        self._most_w.value = np.minimum(engine.power_max_w, net_w + battery.power_charge_max_w)
-        self._missing_w.value = np.maximum(missing_w - engine.power_min_w, 0.0)
-        self._on_least.value = np.where(missing_w > 0.0, SIGMA_FORCED, 0.0)
-        self._soc_low.value, self._soc_high.value = self._soc_limits(stages, soc)
-        row = coolant_row(self.vehicle, self.model, stages, about)
-        self._h_alpha.value = h * row.alpha
-        self._h_growth.value = h * row.growth_g_per_s_per_k
-        self._per_start.value, self._per_heat.value = row.per_start, row.per_heat_k_per_w
-        self._per_fuel.value = row.per_heat_k_per_w * row.alpha
-        self._per_mean.value = row.per_heat_k_per_w * row.w_per_k
-        self._constant_degc.value = row.constant_degc
-        self._smooth(scaling)
+        found = self._quantities.update(stages, soc, about)
 
-    def _soc_limits(self, stages: Stages, soc: float) -> tuple[Floats, Floats]:
-        """Limits with reserve and terminal band, no higher than charging all the way reaches."""
-        battery, trip, settings = self.vehicle.battery, self.vehicle.trip, self.settings
-        reserve = settings.soc_reserve * max(trip.soc_init - battery.soc_min, 0.0)
-        low = battery.soc_min + np.where(stages.duration_s > ACCURATE_STAGE_S, reserve, 0.0)
-        high = np.full(self.stages, battery.soc_max)
-        if not settings.soc_penalty_g:
-            low[-1] = max(settings.terminal_low * trip.soc_init, battery.soc_min)
-            high[-1] = min(settings.terminal_high * trip.soc_init, battery.soc_max)
-        strongest_w = np.maximum(
-            stages.net_w - self.vehicle.engine.power_max_w, -battery.power_charge_max_w
-        )
-        gained = -stages.duration_s * self.model.battery(strongest_w) / self.model.battery_energy_j
-        return np.minimum(low, soc + np.cumsum(gained) - REACH_MARGIN_SOC), high
+        def stagewise(name: str) -> Floats:
+            return np.asarray(found[name])[:, 0]
+
+        h, missing_w = stages.duration_s, stagewise("missing_w")
+        self._h.value, self._net_w.value, self._off_w.value = h, stages.net_w, stages.internal_off_w
+        self._most_w.value = stagewise("most_w")
+        self._missing_w.value = np.maximum(missing_w - self.vehicle.engine.power_min_w, 0.0)
+        self._on_least.value = np.where(missing_w > 0.0, SIGMA_FORCED, 0.0)
+        self._soc_low.value, self._soc_high.value = stagewise("soc_low"), stagewise("soc_high")
+        self._h_alpha.value = h * stagewise("alpha")
+        self._h_growth.value = h * stagewise("growth")
+        self._per_start.value, self._per_heat.value = stagewise("per_start"), stagewise("per_heat")
+        self._per_fuel.value = self._per_heat.value * stagewise("alpha")
+        self._per_mean.value = self._per_heat.value * stagewise("w_per_k")
+        self._constant_degc.value = stagewise("settled_k")
+        self._smooth(scaling)
 
     def _smooth(self, scaling: Scaling | None) -> None:
         weights = np.zeros((self.stages, VARS))

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.preview.horizon import HorizonSettings
-from qpmpc.qp.structure import Var
+from qpmpc.qp.rows import Var
 
 Floats = NDArray[np.float64]
 

@@ -1,6 +1,7 @@
 """The multi-horizon QP: values of all its entries, updated in place of being rebuilt."""
 
 from dataclasses import dataclass
+from types import CodeType
 from typing import Annotated
 
 import numpy as np
@@ -9,20 +10,19 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
-from qpmpc.qp.coolant import coolant_row
+from qpmpc.qp.coolant import radiator_w_per_k
+from qpmpc.qp.expressions import code_of, expression
 from qpmpc.qp.linearisation import Linearisation
+from qpmpc.qp.quantities import Quantities
+from qpmpc.qp.rows import ROWS, SHORTEST_SCALE_S, VARIABLES, VARS, Rows, Var, cost_terms, states
 from qpmpc.qp.scaling import Scaling, ScalingSettings
-from qpmpc.qp.structure import VARS, QpStructure, Rows, Var
+from qpmpc.qp.structure import QpStructure
 from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
 Weight = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
-SHORTEST_SCALE_S = 1.0  # a masked stage is scaled as one of 1 s
 T_CL_MAX_MARGIN_K = 0.05  # small: the radiator is fully open only at the limit itself
-REACH_MARGIN_SOC = 1e-5
-ACCURATE_STAGE_S = 1.0  # a stage of this length or less is known, a longer one is forecast
-SIGMA_FORCED = 0.99  # "engine must be on" as a lower bound on sigma, kept apart from the upper one
 LEAST_COST = 1e-9  # of any fuel entry: where all stages are masked the cost is scaled by this
 
 
@@ -66,10 +66,43 @@ class QpData:
     scaling: Scaling
 
 
+def qp_parameters(
+    vehicle: Vehicle, model: PwaModel, settings: QpSettings, units: ScalingSettings
+) -> dict[str, float]:
+    """Collect the numbers that the QP is made of, by the names that its table gives them."""
+    engine, battery, thermal, trip = vehicle.engine, vehicle.battery, vehicle.thermal, vehicle.trip
+    return {
+        "engine_max_w": engine.power_max_w,
+        "engine_min_w": engine.power_min_w,
+        "lhv_j_per_g": engine.lhv_j_per_g,
+        **{name: float(value) for name, value in thermal.model_dump().items()},
+        "thermostat_w_per_k": radiator_w_per_k(thermal),
+        "battery_energy_j": model.battery_energy_j,
+        "battery_discharge_max_w": battery.power_discharge_max_w,
+        "battery_charge_max_w": battery.power_charge_max_w,
+        "soc_min": battery.soc_min,
+        "soc_max": battery.soc_max,
+        "soc_init": trip.soc_init,
+        # of stages of more than 1 s, above soc_min
+        "soc_reserve": settings.soc_reserve * max(trip.soc_init - battery.soc_min, 0.0),
+        "terminal_soc_low": max(settings.terminal_low * trip.soc_init, battery.soc_min),
+        "terminal_soc_high": min(settings.terminal_high * trip.soc_init, battery.soc_max),
+        "soc_penalty_g": settings.soc_penalty_g,
+        "t_min_degc": thermal.t_cl_min_degc + settings.t_cl_margin_k,
+        "t_max_degc": thermal.t_cl_max_degc - T_CL_MAX_MARGIN_K,
+        "slack_g_per_k": settings.slack_g_per_k,
+        "regularisation": settings.regularisation,
+        "unit_soc": units.energy_j / model.battery_energy_j,
+        "unit_t_k": units.t_cl_k,
+        "unit_power_w": units.power_w,
+        "unit_fuel_g_per_s": units.fuel_g_per_s,
+    }
+
+
 class StageQp:
     """QP of one trip: structure once, values each step.
 
-    min  sum_k h_k [alpha(T^) F_k + alpha'(T^) F^ T_k] + slack  over the rows of `Rows`
+    min  sum_k h_k [alpha(T^) F_k + alpha'(T^) F^ T_k] + slack  over the rows of `qpmpc.qp.rows`
 
     with T_k the mean coolant temperature of the stage; the source is the paper's problem
     (eqs. 9-11) after the perspective relaxation of the on/off choice.
@@ -90,21 +123,45 @@ class StageQp:
         scaling: ScalingSettings,
     ) -> None:
         self.vehicle, self.model, self.settings, self.units = vehicle, model, settings, scaling
-        self.rows = Rows(model.fuel.pieces, model.battery.pieces)
+        self.rows = Rows(fuel=model.fuel.pieces, battery=model.battery.pieces)
         self.structure = QpStructure(stages, self.rows)
         self.stages = stages
-        battery_rows = range(self.rows.battery.start, self.rows.battery.stop)
-        self._battery_on = [self.structure.index[row, Var.ON, False] for row in battery_rows]
-        self._values = self._constant_entries()
-        self._lower, self._upper = self._constant_bounds()
+        parameters = qp_parameters(vehicle, model, settings, scaling)
+        self._quantities = Quantities(parameters, vehicle.thermal, model, stages)
+        self._values = np.empty((stages, len(self.structure.index)))
+        self._lower = np.full((stages, self.rows.count), -np.inf)
+        self._upper = np.full((stages, self.rows.count), np.inf)
+        self._each_step = self._fill_constants()
+        self._before = [
+            (self.rows[row.name], self.structure.places(row, entry), entry.var)
+            for row in ROWS
+            for entry in row.terms
+            if entry.before
+        ]
+        self._weights = [(entry, code_of(factor)) for entry, factor in cost_terms().items()]
         self._hessian = np.full((stages, VARS), settings.regularisation)
-        self._hessian[:, [Var.SOC, Var.T_CL]] = 0.0
-        self._unit = np.empty(VARS)
-        self._unit[Var.SOC] = scaling.energy_j / model.battery_energy_j
-        self._unit[[Var.T_CL, Var.T_SLACK]] = scaling.t_cl_k
-        self._unit[[Var.P_ENG, Var.INTERNAL]] = scaling.power_w
-        self._unit[[Var.ON, Var.FUEL]] = 1.0, scaling.fuel_g_per_s
-        self._is_rate = np.isin(np.arange(VARS), [Var.P_ENG, Var.ON, Var.FUEL, Var.INTERNAL])
+        self._hessian[:, states()] = 0.0
+        units = [expression(variable.unit) for variable in VARIABLES.values()]
+        self._unit = np.array([self._quantities.value(code_of(unit)) for unit in units])
+        self._is_rate = np.array([variable.is_rate for variable in VARIABLES.values()])
+
+    def _fill_constants(self) -> list[tuple[Floats, CodeType]]:
+        """Fill in what no step changes; return the other places and what to fill them with."""
+        structure, each_step = self.structure, []
+        for row in ROWS:
+            place = self.rows[row.name]
+            for entry, factor in row.terms.items():
+                values = self._values[:, structure.places(row, entry)]
+                if self._quantities.is_changing(factor):
+                    each_step.append((values, code_of(factor)))
+                else:
+                    values[:] = self._quantities.value(code_of(factor))
+            for bounds, bound in ((self._lower, row.low), (self._upper, row.high)):
+                if bound is not None and (row.before or self._quantities.is_changing(bound)):
+                    each_step.append((bounds[:, place], code_of(bound)))
+                elif bound is not None:
+                    bounds[:, place] = self._quantities.value(code_of(bound))
+        return each_step
 
     def update(self, stages: Stages, soc: float, t_cl_degc: float, about: Linearisation) -> QpData:
         """Compute all values for a horizon, a state and a linearisation point.
@@ -119,112 +176,25 @@ class StageQp:
         -------
         `QpData` in solver units, with the `Scaling` that leads back
         """
-        self._fill_battery(stages, soc)
-        self._fill_engine(stages)
-        weights = self._fill_coolant(stages, t_cl_degc, about)
+        value = self._quantities.value
+        self._quantities.update(stages, soc, about)
+        for place, formula in self._each_step:
+            place[:] = value(formula)
+        self._start_at({Var.SOC: soc, Var.T_CL: t_cl_degc})
         cost = np.zeros((self.stages, VARS))
-        cost[:, Var.FUEL], t_cl_weight = weights
-        cost[:, Var.T_CL] = t_cl_weight
-        cost[:-1, Var.T_CL] += t_cl_weight[1:]
-        cost[:, Var.T_SLACK] = self.settings.slack_g_per_k
+        for entry, weight in self._weights:
+            if entry.before:
+                cost[:-1, [entry.var]] += np.broadcast_to(value(weight), (self.stages, 1))[1:]
+            else:
+                cost[:, [entry.var]] += value(weight)
         return self._scaled(stages.duration_s, cost)
 
-    def _constant_entries(self) -> Floats:
-        """Entries of A that no step changes; the others are 1 until they are filled in."""
-        index, rows, model = self.structure.index, self.rows, self.model
-        values = np.ones((self.stages, len(index)))
-        values[:, index[rows.soc, Var.SOC, True]] = -1.0
-        values[:, index[rows.p_eng_min, Var.ON, False]] = -self.vehicle.engine.power_min_w
-        values[:, index[rows.t_cl_max, Var.T_SLACK, False]] = -1.0
-        for i, row in enumerate(range(rows.fuel.start, rows.fuel.stop)):
-            values[:, index[row, Var.P_ENG, False]] = -model.fuel.slope[i]
-            values[:, index[row, Var.ON, False]] = -model.fuel.intercept[i]
-        for j, row in enumerate(range(rows.battery.start, rows.battery.stop)):
-            values[:, index[row, Var.P_ENG, False]] = model.battery.slope[j]
-        return values
-
-    def _constant_bounds(self) -> tuple[Floats, Floats]:
-        """Bounds that no step changes; infinite where a row has one side only."""
-        rows, battery, thermal = self.rows, self.vehicle.battery, self.vehicle.thermal
-        lower = np.full((self.stages, rows.count), -np.inf)
-        upper = np.full((self.stages, rows.count), np.inf)
-        lower[:, rows.soc] = upper[:, rows.soc] = 0.0
-        lower[:, rows.fuel] = 0.0
-        upper[:, rows.p_eng_max] = 0.0
-        upper[:, rows.box_on] = 1.0
-        upper[:, rows.box_soc] = battery.soc_max
-        if not self.settings.soc_penalty_g:
-            upper[-1, rows.box_soc] = min(
-                self._terminal(self.settings.terminal_high), battery.soc_max
-            )
-        lower[:, rows.t_cl_min] = thermal.t_cl_min_degc + self.settings.t_cl_margin_k
-        upper[:, rows.t_cl_max] = thermal.t_cl_max_degc - T_CL_MAX_MARGIN_K
-        lower[:, rows.box_slack] = 0.0
-        return lower, upper
-
-    @property
-    def soc_reserve(self) -> float:
-        """Reserve of forecast stages above the lower SOC limit, in SOC."""
-        room = self.vehicle.trip.soc_init - self.vehicle.battery.soc_min
-        return self.settings.soc_reserve * max(room, 0.0)
-
-    def _terminal(self, multiple: float) -> float:
-        return multiple * self.vehicle.trip.soc_init
-
-    def _fill_battery(self, stages: Stages, soc: float) -> None:
-        """SOC dynamics, battery pieces in perspective, and SOC limits that can be met."""
-        index, rows, battery = self.structure.index, self.rows, self.vehicle.battery
-        net, h, energy = stages.net_w, stages.duration_s, self.model.battery_energy_j
-        off_w = stages.internal_off_w
-        self._values[:, index[rows.soc, Var.INTERNAL, False]] = h / energy
-        self._lower[0, rows.soc] = self._upper[0, rows.soc] = soc
-        pieces = self.model.battery
-        self._values[:, self._battery_on] = -(
-            np.multiply.outer(net, pieces.slope) + pieces.intercept - off_w[:, None]
-        )
-        self._lower[:, rows.battery] = off_w[:, None]
-        low = battery.soc_min + np.where(h > ACCURATE_STAGE_S, self.soc_reserve, 0.0)
-        if not self.settings.soc_penalty_g:
-            low[-1] = max(self._terminal(self.settings.terminal_low), battery.soc_min)
-        self._lower[:, rows.box_soc] = np.minimum(low, self._reachable_soc(stages, soc))
-
-    def _reachable_soc(self, stages: Stages, soc: float) -> Floats:
-        """Highest SOC at the end of each stage, charging all the way: a limit above it is moot."""
-        battery, most_w = self.vehicle.battery, self.vehicle.engine.power_max_w
-        strongest = np.maximum(stages.net_w - most_w, -battery.power_charge_max_w)
-        internal = self.model.battery(strongest)
-        gain = stages.duration_s * internal / self.model.battery_energy_j
-        return soc - np.cumsum(gain) - REACH_MARGIN_SOC
-
-    def _fill_engine(self, stages: Stages) -> None:
-        """Power limits of the on-share, and stages that the battery alone cannot drive."""
-        index, rows, battery = self.structure.index, self.rows, self.vehicle.battery
-        engine = self.vehicle.engine
-        most = np.minimum(engine.power_max_w, stages.net_w + battery.power_charge_max_w)
-        self._values[:, index[rows.p_eng_max, Var.ON, False]] = -most
-        missing = stages.net_w - battery.power_discharge_max_w
-        self._lower[:, rows.p_eng_min] = np.maximum(missing - engine.power_min_w, 0.0)
-        self._lower[:, rows.box_on] = np.where(missing > 0.0, SIGMA_FORCED, 0.0)
-
-    def _fill_coolant(
-        self, stages: Stages, t_cl_degc: float, about: Linearisation
-    ) -> tuple[Floats, Floats]:
-        """Coolant row; returns the cost weights of F and of T at both ends of the stage."""
-        index, rows, h = self.structure.index, self.rows, stages.duration_s
-        row = coolant_row(self.vehicle, self.model, stages, about)
-        share = 1.0 - self.vehicle.thermal.exhaust_share
-        rate = row.per_heat_k_per_w * share
-        half = 0.5 * row.per_heat_k_per_w * row.w_per_k
-        before = half - row.per_start
-        burnt = rate * self.vehicle.engine.lhv_j_per_g * row.alpha
-        self._values[:, index[rows.t_cl, Var.T_CL, False]] = 1.0 + half
-        self._values[:, index[rows.t_cl, Var.T_CL, True]] = before
-        self._values[:, index[rows.t_cl, Var.FUEL, False]] = -burnt
-        self._values[:, index[rows.t_cl, Var.P_ENG, False]] = rate
-        self._lower[:, rows.t_cl] = row.constant_degc
-        self._lower[0, rows.t_cl] -= before[0] * t_cl_degc
-        self._upper[:, rows.t_cl] = self._lower[:, rows.t_cl]
-        return h * row.alpha, 0.5 * h * row.growth_g_per_s_per_k
+    def _start_at(self, state: dict[Var, float]) -> None:
+        """Put the state now, which is no variable, into the bounds of the first stage."""
+        for rows, entries, var in self._before:
+            known = self._values[0, entries] * state[var]
+            self._lower[0, rows] -= known
+            self._upper[0, rows] -= known
 
     def _scaled(self, duration_s: Floats, cost: Floats) -> QpData:
         """Scale to solver units: columns by unit and duration, rows to unit norm, cost to one."""

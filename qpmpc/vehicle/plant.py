@@ -5,6 +5,7 @@ This is the truth that every controller is measured on. Controllers never call i
 
 from typing import NamedTuple
 
+from qpmpc.vehicle import heat
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.engine import OptimalLine, alpha_at
 from qpmpc.vehicle.parameters import Vehicle
@@ -67,24 +68,6 @@ class Plant:
         """Return the state at the start of a trip: engine off, SOC and coolant from `trip`."""
         return PlantState(self.vehicle.trip.soc_init, self.vehicle.trip.t_cl_init_degc)
 
-    def air_w(self, t_cl_degc: float, speed_mps: float) -> float:
-        """Heat lost to the air, Q_air = (UA0 + UA1 v) (T_cl - T_amb)."""
-        th = self.vehicle.thermal
-        conductance = th.ua0_w_per_k + th.ua1_w_per_k_per_mps * speed_mps
-        return conductance * (t_cl_degc - th.t_amb_degc)
-
-    def radiator_w(self, t_cl_degc: float) -> float:
-        """Heat lost through the radiator, which the thermostat opens linearly over its span."""
-        th = self.vehicle.thermal
-        opening = min(max((t_cl_degc - th.thermostat_open_degc) / th.thermostat_span_k, 0.0), 1.0)
-        return opening * th.radiator_w_per_k * (t_cl_degc - th.t_amb_degc)
-
-    def cabin_w(self, t_cl_degc: float) -> float:
-        """Heat taken by the cabin, Q_heat, faded in between two coolant temperatures."""
-        th = self.vehicle.thermal
-        span = th.cabin_heat_full_degc - th.cabin_heat_from_degc
-        return th.cabin_heat_w * min(max((t_cl_degc - th.cabin_heat_from_degc) / span, 0.0), 1.0)
-
     def step(
         self, state: PlantState, command: Command, demand_w: float, speed_mps: float
     ) -> tuple[PlantState, StepFlows]:
@@ -129,9 +112,9 @@ class Plant:
             fuel_g += engine.start_fuel_g * started
         fuel_w = fuel_g / h * engine.lhv_j_per_kg * 1e-3
         exhaust = vehicle.thermal.exhaust_share * (fuel_w - p_eng)
-        air = self.air_w(state.t_cl_degc, speed_mps)
-        radiator = self.radiator_w(state.t_cl_degc)
-        cabin = self.cabin_w(state.t_cl_degc)
+        air = heat.air_w(vehicle.thermal, state.t_cl_degc, speed_mps)
+        radiator = heat.radiator_w(vehicle.thermal, state.t_cl_degc)
+        cabin = heat.cabin_w(vehicle.thermal, state.t_cl_degc)
         coolant = fuel_w - p_eng - exhaust - air - radiator - cabin
         current = self.battery.current_a(state.soc, p_bat)
         following = PlantState(

@@ -253,7 +253,7 @@ def probed(files, tmp_path) -> tuple[HostLibrary, ctypes.c_int]:
     for name, probe in PROBED.items():
         assert f"{name}(" in adapter
         adapter = re.sub(rf"\b{name}\(", f"{probe}(", adapter)
-    first = adapter.index("#define UNLIMITED")
+    first = adapter.index("enum {")
     declared = (
         "OSQPInt probed_solve(OSQPSolver *s);\n"
         "OSQPInt probed_mat(OSQPSolver *s, const OSQPFloat *p, const OSQPInt *pi, OSQPInt pn,\n"

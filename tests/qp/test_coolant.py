@@ -5,8 +5,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from qpmpc.qp.coolant import coolant_step, radiator_w_per_k
-from qpmpc.vehicle import Plant, load_vehicle
+from qpmpc.qp.coolant import radiator_w_per_k, thermostat_step
+from qpmpc.vehicle import load_vehicle
+from qpmpc.vehicle.heat import radiator_w
 
 VEHICLE = load_vehicle()
 THERMAL = VEHICLE.thermal
@@ -16,8 +17,10 @@ heats = st.floats(-20e3, 30e3)
 
 
 def _step(duration_s, start_degc, heat_w):
-    parts = coolant_step(THERMAL, *(np.array([v]) for v in (duration_s, start_degc, heat_w)))
-    return [float(part[0]) for part in parts]
+    opens = THERMAL.thermostat_open_degc
+    inputs = (np.array([v]) for v in (duration_s, start_degc - opens, heat_w))
+    end_k, per_heat, per_start = (float(part[0]) for part in thermostat_step(THERMAL, *inputs))
+    return end_k + opens, per_heat, per_start
 
 
 def _brute_force(duration_s, start_degc, heat_w, steps=20_000):
@@ -73,8 +76,8 @@ def test_radiator_only_cools_and_more_heat_or_a_warmer_start_never_end_colder(
 
 
 def test_chord_of_the_radiator_is_near_the_plant_and_above():
-    plant, slope = Plant(VEHICLE), radiator_w_per_k(THERMAL)
+    slope = radiator_w_per_k(THERMAL)
     span = THERMAL.thermostat_span_k
     for t in np.linspace(THERMAL.thermostat_open_degc, THERMAL.t_cl_max_degc, 21):
-        above = slope * (t - THERMAL.thermostat_open_degc) - plant.radiator_w(float(t))
+        above = slope * (t - THERMAL.thermostat_open_degc) - radiator_w(THERMAL, float(t))
         assert -1e-6 <= above <= THERMAL.radiator_w_per_k * span / 4.0 + 1e-6

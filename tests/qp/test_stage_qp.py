@@ -64,7 +64,7 @@ def test_values_are_fit_for_a_fixed_iteration_solver(step, soc, t_cl_degc, fuel)
     # No row may turn into an equality or back (the solver's step size depends on it).
     rows = qp.rows.count
     equality = (data.upper - data.lower < 1e-4).reshape(-1, rows)
-    states = [qp.rows.soc, qp.rows.t_cl]
+    states = [qp.rows.first("soc"), qp.rows.first("t_cl")]
     assert equality[:, states].all()
     assert not np.delete(equality, states, axis=1).any()
     norms = np.sqrt(np.square(qp.structure.matrix_of(data.a_data).toarray()).sum(axis=1))
@@ -79,7 +79,7 @@ def test_masked_stages_pass_the_state_on_at_no_cost():
     assert len(masked) > 10
     for k in masked:
         assert q[k * VARS + Var.FUEL] == 0.0
-        row = a[k * qp.rows.count + qp.rows.soc]
+        row = a[k * qp.rows.count + qp.rows.first("soc")]
         expected = np.zeros_like(row)
         expected[k * VARS + Var.SOC], expected[(k - 1) * VARS + Var.SOC] = 1.0, -1.0
         np.testing.assert_allclose(row, expected, atol=1e-12)
@@ -137,7 +137,7 @@ def test_terminal_band_and_reachability():
     qp = _qp(terminal_low=1.0, terminal_high=1.01)
     data = qp.update(BUILDER.at(0), 0.6, 50.0, _about())
     rows = qp.rows
-    last = (BUILDER.count - 1) * rows.count + rows.box_soc
+    last = (BUILDER.count - 1) * rows.count + rows.first("box_soc")
     assert data.lower[last] / data.scaling.row[last] == pytest.approx(0.6)
     assert data.upper[last] / data.scaling.row[last] == pytest.approx(0.606)
     # Two seconds before the end with an empty battery the band cannot be met: the limit gives way.
@@ -170,7 +170,7 @@ def test_forecast_stages_keep_a_reserve_of_charge_and_known_ones_do_not():
     stages = BUILDER.at(0)
     data = qp.update(stages, 0.6, 60.0, _about())
     lower = (data.lower / data.scaling.row).reshape(qp.stages, -1)
-    planned = lower[:, qp.rows.box_soc]
+    planned = lower[:, qp.rows.first("box_soc")]
     battery, trip = VEHICLE.battery, VEHICLE.trip
     reserved = battery.soc_min + 0.5 * (trip.soc_init - battery.soc_min)
     assert planned[:-1] == pytest.approx(

@@ -48,7 +48,7 @@ def chosen(recording: Recording) -> list[Solve]:
 def infeasible(recording: Recording) -> QpData:
     """Ask for more charge at the end than the trip allows."""
     structure, data = recording.structure, recording.solves[20].data
-    row = (structure.stages - 1) * structure.rows.count + structure.rows.box_soc
+    row = (structure.stages - 1) * structure.rows.count + structure.rows.first("box_soc")
     lower, upper = data.lower.copy(), data.upper.copy()
     upper[row] = 4.0 * upper[row]
     lower[row] = 0.99 * upper[row]
@@ -165,7 +165,7 @@ def test_update_equals_new_setup(name: str, recordings: list[Recording]) -> None
     recording = recordings[0]
     structure, first = recording.structure, recording.solves[40].data
     second = recording.solves[90].data
-    row = (structure.stages - 1) * structure.rows.count + structure.rows.box_soc
+    row = (structure.stages - 1) * structure.rows.count + structure.rows.first("box_soc")
     fixed = second.lower.copy(), second.upper.copy()
     fixed[1][row] = fixed[0][row]
     open_end = second.upper.copy()

@@ -74,7 +74,8 @@ def test_infeasible_is_not_usable_and_does_not_poison_the_next_solve(recorded):
     rows = recorded.qp.rows
     last = lower.reshape(-1, rows.count)[-1]
     top = upper.reshape(-1, rows.count)[-1]
-    last[rows.box_soc], top[rows.box_soc] = 1e4, 1e4 + 1.0  # a final SOC far beyond reach
+    final = rows.first("box_soc")
+    last[final], top[final] = 1e4, 1e4 + 1.0  # a final SOC far beyond reach
     solver = _fresh(recorded, cold_iterations=8000)
     bad = solver.solve(replace(data, lower=lower, upper=upper), None, None, cold=True)
     assert bad.status is Status.INFEASIBLE

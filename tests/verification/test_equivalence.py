@@ -98,11 +98,11 @@ def test_other_settings(vehicle_changes: dict[str, object], changes: dict[str, o
 @pytest.mark.parametrize(
     ("file", "old", "new", "part"),
     [
-        ("mpc_admm.c", "(a->p_min[1] * x[VAR_ON])", "x[VAR_ON]", "matrices"),
-        ("mpc_admm.c", "b->t_max_high", "UNLIMITED", "matrices"),
-        ("mpc_qp.c", "stage->q[VAR_SLACK] = mpc_par", "stage->q[VAR_SLACK] = -mpc_par", "matrices"),
+        ("mpc_rows_admm.h", "(a->p_eng_min.on * x[VAR_ON])", "x[VAR_ON]", "matrices"),
+        ("mpc_rows_admm.h", "b->t_cl_max_high", "REAL(1.0e30)", "matrices"),
+        ("mpc_rows_values.h", "q[VAR_T_SLACK] += mpc_par", "q[VAR_T_SLACK] -= mpc_par", "matrices"),
         # the solver's own work: the matrix is right, what is found with it is not
-        ("mpc_admm.c", "f_f += entry[0] * entry[0];", "", "optimum"),
+        ("mpc_rows_admm.h", "m_fuel_fuel += a->fuel[i].fuel * a->fuel[i].fuel;", "", "optimum"),
     ],
 )
 def test_c_that_differs_is_noticed(monkeypatch, file, old, new, part) -> None:

@@ -1,14 +1,14 @@
 """Every check can fail: break an ingredient, and the quick checks notice.
 
 A mutation replaces a piece of source text, which must occur exactly once, in a function of the
-product. The test then runs the quick checks that should notice on a fresh context; the mutation
-is caught if one of them fails.
+product or in its table of rows. The test then runs the quick checks that should notice on a fresh
+context; the mutation is caught if one of them fails.
 """
 
 import inspect
 import textwrap
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,11 +20,13 @@ import qpmpc.preview.forecast
 import qpmpc.preview.stages
 import qpmpc.pwa.model
 import qpmpc.qp.stage_qp
+import qpmpc.vehicle.heat
 from qpmpc.codegen.host_library import compiler
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.preview.forecast import Trace
 from qpmpc.preview.stages import StageBuilder
+from qpmpc.qp import rows
 from qpmpc.qp.cvxpy_twin import CvxpyTwin
 from qpmpc.qp.scaling import Scaling
 from qpmpc.qp.stage_qp import StageQp
@@ -91,6 +93,7 @@ class Mutation:
 
 
 QP, STAGES, PLANT = (same_optimum,), (stages_agree,), (books_balance,)
+BATTERY = next(row for row in rows.ROWS if row.name == "battery")
 RENDERINGS, BACKENDS = (one_qp,), (common_problems,)
 NLP = (plans_beside_the_nonlinear_program,)
 
@@ -105,7 +108,7 @@ MUTATIONS = [
         "demand_w + battery.aux_power_w - p_eng", "demand_w - p_eng", PLANT,
     ),
     Mutation(
-        "plant's UA in km/h", Plant, "air_w",
+        "plant's UA in km/h", qpmpc.vehicle.heat, "ua_w_per_k",
         "* speed_mps", "* 3.6 * speed_mps", PLANT,
     ),
     Mutation(
@@ -155,44 +158,44 @@ MUTATIONS = [
         "(k - self.entry_before) * VARS", "(k - 2 * self.entry_before) * VARS", QP,
     ),
     Mutation(
-        "alpha' = 0", qpmpc.qp.stage_qp, "coolant_row",
-        "* about.fuel_g_per_s\n    ua", "* 0.0\n    ua", (*QP, *RENDERINGS),
-        ("Matrices, cvxpy", "Matrices, casadi", "Optimum, cvxpy", "Optimum, casadi"),
+        "alpha' = 0", rows, "QUANTITIES",
+        "pwa_alpha_slope(about_t_cl_degc) *", "0.0 *", (*QP, *RENDERINGS),
+        ("Matrices, casadi", "Optimum, casadi"),
     ),
     Mutation(
-        "wrong terminal band", StageQp, "_terminal",
-        "return multiple", "return 0.98 * multiple", (*QP, *NLP),
+        "wrong terminal band", qpmpc.qp.stage_qp, "qp_parameters",
+        "max(settings.terminal_low", "max(0.98 * settings.terminal_low", (*QP, *NLP),
         ("Optimum of the QP", "Planned fuel"),
     ),
     Mutation(
-        "UA of a stage in km/h", qpmpc.qp.stage_qp, "coolant_row",
-        "* stages.speed_mps", "* 3.6 * stages.speed_mps", QP,
+        "UA of a stage in km/h", rows, "QUANTITIES",
+        "ua_w_per_k(speed_mps)", "ua_w_per_k(3.6 * speed_mps)", QP,
     ),
     Mutation(
-        "QP's heating value in kJ", StageQp, "_fill_coolant",
-        "engine.lhv_j_per_g", "engine.lhv_j_per_g * 1e-3", QP,
+        "QP's heating value in kJ", rows, "QUANTITIES",
+        "per_power * lhv_j_per_g", "per_power * 0.001 * lhv_j_per_g", QP,
     ),
     Mutation(
-        "a fuel row is dropped", StageQp, "_constant_bounds",
-        "lower[:, rows.fuel] = 0.0", "lower[:, rows.fuel.start + 1 : rows.fuel.stop] = 0.0", QP,
+        "fuel rows are dropped", StageQp, "_fill_constants",
+        "elif bound is not None", "elif bound is not None and row.pieces != 'fuel'", QP,
     ),
     Mutation(
-        "off-part of the perspective is dropped", StageQp, "_fill_battery",
-        "self._lower[:, rows.battery] = off_w[:, None]", "self._lower[:, rows.battery] = 0.0",
+        "off-part of the perspective is dropped", BATTERY, "text",
+        ">= internal_off_w", ">= 0.0",
         (*QP, *NLP, constant_demand),
         ("Optimum of the QP", "First command, on or off", "Predicted T_cl", "Constant demand"),
     ),
     Mutation(
         "cost of the stage after", StageQp, "update",
-        "t_cl_weight[1:]", "t_cl_weight[:-1]", QP,
+        "(self.stages, 1))[1:]", "(self.stages, 1))[:-1]", QP,
     ),
     Mutation(
-        "no cabin heat", qpmpc.qp.stage_qp, "coolant_row",
-        "heat_at_zero -= _cabin_w(th, about.t_cl_degc)", "", (*QP, *NLP),
+        "no cabin heat", rows, "QUANTITIES",
+        " - cabin_w(about_t_cl_degc)", "", (*QP, *NLP),
         ("Optimum of the QP", "Predicted T_cl"),
     ),
     Mutation(
-        "radiator of a stage as open as at its end", physics_checks, "coolant_step",
+        "radiator of a stage as open as at its end", physics_checks, "thermostat_step",
         "end = np.select(cases, [after_line,",
         "end = np.select(cases, [straight / (1.0 + duration_s / tau),", (thermostat_exact,),
     ),
@@ -221,8 +224,8 @@ MUTATIONS = [
         ("Matrices, casadi", "Optimum, casadi"),
     ),
     Mutation(
-        "generated C with another terminal band", qpmpc.codegen.values, "_problem",
-        "max(qp.terminal_low * soc_init", "max(0.99 * qp.terminal_low * soc_init", RENDERINGS,
+        "generated C with another terminal band", qpmpc.codegen.values, "_solver",
+        "osqp.relaxation,", "osqp.relaxation, 'terminal_soc_low': 0.59,", RENDERINGS,
         ("Matrices, c", "Optimum, c"),
     ),
     # the nonlinear program
@@ -279,6 +282,15 @@ def failures(*checks: Callable[..., Any]) -> list[str]:
 
 def mutate(monkeypatch: pytest.MonkeyPatch, mutation: Mutation) -> None:
     member = inspect.getattr_static(mutation.owner, mutation.name)
+    if isinstance(member, str):  # of the table
+        assert member.count(mutation.old) == 1
+        changed = {mutation.name: member.replace(mutation.old, mutation.new)}
+        if isinstance(mutation.owner, rows.Row):  # with what it has parsed
+            row = replace(mutation.owner, **changed)
+            changed |= {"terms": row.terms, "_compared": row._compared}
+        for name, value in changed.items():
+            monkeypatch.setitem(vars(mutation.owner), name, value)
+        return
     function = getattr(member, "__func__", member)
     source = textwrap.dedent(inspect.getsource(function))
     assert source.count(mutation.old) == 1, f"{mutation.old!r} is not there, or more than once"

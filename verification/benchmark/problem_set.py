@@ -11,8 +11,9 @@ from scipy.optimize import linprog
 
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
+from qpmpc.qp.rows import VARS, Var
 from qpmpc.qp.stage_qp import QpData
-from qpmpc.qp.structure import VARS, QpStructure, Var
+from qpmpc.qp.structure import QpStructure
 from qpmpc.trip import Trip
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.verification.benchmark.recorder import record
@@ -86,7 +87,7 @@ def _degenerate(structure: QpStructure, data: QpData) -> Iterator[tuple[str, Kin
     yield "without curvature", "degenerate", replace(data, hessian=np.zeros_like(data.hessian))
     yield "a fuel row twice", "degenerate", _row_twice(structure, data)
     last = structure.stages - 1
-    row = last * structure.rows.count + structure.rows.box_soc
+    row = last * structure.rows.count + structure.rows.first("box_soc")
     end = float(data.lower[row])
     yield "terminal band closed", "degenerate", _bounded(data, row, end, end)
     highest = _extreme(structure, data, last, Var.SOC)
@@ -97,21 +98,21 @@ def _degenerate(structure: QpStructure, data: QpData) -> Iterator[tuple[str, Kin
 def _infeasible(structure: QpStructure, data: QpData) -> Iterator[tuple[str, Kind, QpData]]:
     """QPs that ask for a little more than can be had, and one for much more."""
     rows, last = structure.rows, structure.stages - 1
-    row = last * rows.count + rows.box_soc
+    row = last * rows.count + rows.first("box_soc")
     more = _extreme(structure, data, last, Var.SOC) + BARELY
     needed = _in_row(structure, data, row, more)
     yield "terminal SOC out of reach", "infeasible", _bounded(data, row, needed, np.inf)
-    row = THIRD * rows.count + rows.box_soc
+    row = THIRD * rows.count + rows.first("box_soc")
     tenfold = 10.0 * data.upper[row]
     yield "SOC ten times its limit", "infeasible", _bounded(data, row, tenfold, tenfold)
 
-    held = _bounded(data, THIRD * rows.count + rows.box_slack, 0.0, 0.0)
-    row = THIRD * rows.count + rows.t_cl_max
+    held = _bounded(data, THIRD * rows.count + rows.first("box_slack"), 0.0, 0.0)
+    row = THIRD * rows.count + rows.first("t_cl_max")
     colder = _extreme(structure, held, THIRD, Var.T_CL, highest=False) - BARELY
     allowed = _in_row(structure, held, row, colder)
     yield "coolant cannot be as cold", "infeasible", _bounded(held, row, -np.inf, allowed)
 
-    row = THIRD * rows.count + rows.box_soc
+    row = THIRD * rows.count + rows.first("box_soc")
     lowest = _extreme(structure, data, THIRD, Var.SOC, highest=False) - BARELY
     limit = _in_row(structure, data, row, lowest)
     yield "battery cannot be as empty", "infeasible", _bounded(data, row, -np.inf, limit)
@@ -134,11 +135,9 @@ def _row_twice(structure: QpStructure, data: QpData) -> QpData:
     place = structure.data(np.arange(float(np.prod(shape))).reshape(shape)).astype(np.intp)
     values = np.zeros(shape)
     values.ravel()[place] = data.a_data
-    first, rows = structure.rows.fuel.start, structure.rows.count
-    for var in (Var.FUEL, Var.P_ENG, Var.ON):
-        values[:, structure.index[first + 1, var, False]] = values[
-            :, structure.index[first, var, False]
-        ]
+    first, rows = structure.rows.first("fuel"), structure.rows.count
+    of_first, of_second = (structure.entry_row == row for row in (first, first + 1))
+    values[:, of_second] = values[:, of_first]
     low, high = data.lower.reshape(-1, rows).copy(), data.upper.reshape(-1, rows).copy()
     low[:, first + 1], high[:, first + 1] = low[:, first], high[:, first]
     return replace(data, a_data=structure.data(values), lower=low.ravel(), upper=high.ravel())
@@ -153,7 +152,7 @@ def _extreme(
     a = structure.matrix_of(data.a_data)
     lower, upper = data.lower.copy(), data.upper.copy()
     if var is Var.SOC:
-        row = stage * structure.rows.count + structure.rows.box_soc
+        row = stage * structure.rows.count + structure.rows.first("box_soc")
         lower[row], upper[row] = -np.inf, np.inf
     above, below = np.isfinite(upper), np.isfinite(lower)
     found = linprog(

@@ -15,7 +15,7 @@ from qpmpc.preview import HorizonSettings, StageBuilder, Trace
 from qpmpc.pwa import PwaModel
 from qpmpc.pwa.model import PwaTolerances
 from qpmpc.qp import Linearisation, QpSettings, ScalingSettings, StageQp, Var
-from qpmpc.qp.structure import VARS
+from qpmpc.qp.rows import VARS
 from qpmpc.solvers.names import make_solver
 from qpmpc.vehicle.parameters import Vehicle
 

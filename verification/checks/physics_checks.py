@@ -11,7 +11,7 @@ from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.preview import Stages
 from qpmpc.pwa import PwaModel
 from qpmpc.qp import Linearisation, QpSettings, ScalingSettings, StageQp
-from qpmpc.qp.coolant import coolant_step
+from qpmpc.qp.coolant import thermostat_step
 from qpmpc.solvers.names import make_solver
 from qpmpc.trip import Trip
 from qpmpc.vehicle import Vehicle
@@ -81,17 +81,18 @@ def thermostat_exact(context: Context) -> Iterator[Check]:
     duration = rng.choice([1.0, 20.0, 60.0, 200.0], STAGES_TRIED)
     start, heat = rng.uniform(75.0, 91.0, STAGES_TRIED), rng.uniform(-15e3, 30e3, STAGES_TRIED)
     after = np.vectorize(equations.coolant_after_degc)
-    end, per_heat, per_start = coolant_step(thermal, duration, start, heat)
+    opens = thermal.thermostat_open_degc
+    end, per_heat, per_start = thermostat_step(thermal, duration, start - opens, heat)
     step_w, step_k = 1.0, 1e-5
     by_heat = after(duration, start, heat + step_w) - after(duration, start, heat - step_w)
     by_start = after(duration, start + step_k, heat) - after(duration, start - step_k, heat)
     worst = max(
-        float(np.abs(end - after(duration, start, heat)).max()),
+        float(np.abs(opens + end - after(duration, start, heat)).max()),
         float(np.abs(per_heat - by_heat / (2.0 * step_w)).max() * 1e3),
         float(np.abs(per_start - by_start / (2.0 * step_k)).max()),
     )
-    opened = np.count_nonzero((start < thermal.thermostat_open_degc) & (per_start < 1.0))
-    closed = np.count_nonzero((start > thermal.thermostat_open_degc) & (end < 85.0))
+    opened = np.count_nonzero((start < opens) & (per_start < 1.0))
+    closed = np.count_nonzero((start > opens) & (end < 0.0))
     yield Check(
         "Thermostat within a stage",
         "Coolant at the end of a stage, and what a kW or a kelvin more makes of it, are those of "

@@ -14,7 +14,7 @@ from qpmpc.controllers.mh_qp import MhQp
 from qpmpc.controllers.qp_planner import QpPlan
 from qpmpc.controllers.receding_horizon import RecedingHorizon
 from qpmpc.controllers.settings import ControllerSettings
-from qpmpc.qp.structure import Var
+from qpmpc.qp.rows import Var
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.engine import OptimalLine, alpha
 from qpmpc.vehicle.parameters import Vehicle

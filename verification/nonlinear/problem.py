@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.preview.stages import Stages
-from qpmpc.qp.stage_qp import ACCURATE_STAGE_S, SIGMA_FORCED, T_CL_MAX_MARGIN_K, QpSettings
+from qpmpc.qp.rows import ACCURATE_STAGE_S, SIGMA_FORCED, Var
+from qpmpc.qp.stage_qp import T_CL_MAX_MARGIN_K, QpSettings
 from qpmpc.vehicle.battery import BatteryMaps
+from qpmpc.vehicle.heat import air_w
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.verification.nonlinear.maps import SmoothMaps, casadi
 
@@ -17,13 +19,16 @@ Floats = NDArray[np.float64]
 
 
 class NlpVar(IntEnum):
-    """Variables of a stage, in solver units (`UNIT` says how much SI one of them is)."""
+    """Variables of a stage, in solver units (`UNIT` says how much SI one of them is).
 
-    SOC = 0  # at the end of the stage
-    T_CL = 1  # degC, at the end of the stage
-    ABOVE = 2  # D, mean engine power above the least it can run at, W
-    ON = 3  # sigma, share of the stage with the engine on
-    T_SLACK = 4  # K beyond the coolant limits
+    Those of the QP, in its places; fuel and internal power are maps here, and slack follows.
+    """
+
+    SOC = Var.SOC
+    T_CL = Var.T_CL
+    ABOVE = Var.P_ENG  # D, mean engine power above the least it can run at, W
+    ON = Var.ON
+    T_SLACK = Var.ON + 1
 
 
 NLP_VARS = len(NlpVar)
@@ -145,7 +150,7 @@ class NlpProblem:
         fuel = maps.alpha(t_cl) * sigma * maps.fuel_g_per_s(power)  # g/s, of the cold engine
         lhv_j_per_g = vehicle.engine.lhv_j_per_g
         heat = (1.0 - th.exhaust_share) * (lhv_j_per_g * fuel - sigma * power)
-        heat -= (th.ua0_w_per_k + th.ua1_w_per_k_per_mps * speed_mps) * (t_cl - th.t_amb_degc)
+        heat -= air_w(th, t_cl, speed_mps)
         heat -= maps.cabin_w(t_cl)
         soc_gain = before[0] - h * current / (3600.0 * vehicle.battery.capacity_ah) - x[NlpVar.SOC]
         t_cl_gap = self._coolant_after(before[1], h, heat, thermostat_steps) - x[NlpVar.T_CL]

@@ -9,14 +9,9 @@ from qpmpc.preview.stages import Stages
 from qpmpc.pwa.fit import PwaFit
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.linearisation import Linearisation
-from qpmpc.qp.stage_qp import (
-    ACCURATE_STAGE_S,
-    REACH_MARGIN_SOC,
-    SIGMA_FORCED,
-    T_CL_MAX_MARGIN_K,
-    QpSettings,
-)
-from qpmpc.qp.structure import VARS, Var
+from qpmpc.qp.rows import ACCURATE_STAGE_S, REACH_MARGIN_SOC, SIGMA_FORCED, VARS, Var
+from qpmpc.qp.stage_qp import T_CL_MAX_MARGIN_K, QpSettings
+from qpmpc.vehicle.heat import ua_w_per_k
 from qpmpc.vehicle.parameters import Thermal, Vehicle
 from qpmpc.verification.nonlinear.maps import casadi
 from qpmpc.verification.renderings.matrices import Matrices
@@ -145,7 +140,7 @@ class CasadiQp:
                 on - ca.if_else(missing > 0.0, SIGMA_FORCED, 0.0),
             ]
 
-            ua = th.ua0_w_per_k + th.ua1_w_per_k_per_mps * speed
+            ua = ua_w_per_k(th, speed)
             fade = (about[0, k] - th.cabin_heat_from_degc) / (
                 th.cabin_heat_full_degc - th.cabin_heat_from_degc
             )

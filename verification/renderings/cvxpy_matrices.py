@@ -8,7 +8,7 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
 from qpmpc.qp.cvxpy_twin import UNIT, CvxpyTwin
-from qpmpc.qp.structure import VARS, Var
+from qpmpc.qp.rows import VARS, Var
 from qpmpc.verification.renderings.matrices import Matrices
 
 Floats = NDArray[np.float64]

@@ -18,8 +18,8 @@ from qpmpc.preview.stages import StageBuilder, Stages
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.cvxpy_twin import CvxpyTwin
 from qpmpc.qp.linearisation import Linearisation
+from qpmpc.qp.rows import VARS, Var
 from qpmpc.qp.stage_qp import QpData, StageQp
-from qpmpc.qp.structure import VARS, Var
 from qpmpc.solvers.base import Status
 from qpmpc.solvers.piqp import Piqp
 from qpmpc.solvers.timed import require

@@ -10,7 +10,7 @@ from qpmpc.codegen.controller import InputBuilder
 from qpmpc.codegen.generate import project_files
 from qpmpc.codegen.host_library import HostLibrary, compiled
 from qpmpc.codegen.values import Values
-from qpmpc.qp.structure import VARS, Var
+from qpmpc.qp.rows import VARS, Var
 from qpmpc.trip import Observation
 from qpmpc.verification.renderings.matrices import Matrices, matrices_from
 

@@ -11,7 +11,7 @@ from qpmpc.controllers.base import Decision
 from qpmpc.controllers.mh_qp import MhQp
 from qpmpc.controllers.qp_planner import QpPlan, Solve
 from qpmpc.controllers.settings import ControllerSettings
-from qpmpc.qp.structure import VARS, Var
+from qpmpc.qp.rows import VARS, Var
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.plant import PlantState
 

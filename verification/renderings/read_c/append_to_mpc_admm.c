@@ -5,9 +5,6 @@
  */
 #define FAR REAL(1.0e36) /* far beyond what stands for no bound */
 
-static const int32_t reader_order[MPC_VARS] = {VAR_SOC,  VAR_T_CL,     VAR_P_ENG, VAR_ON,
-                                               VAR_FUEL, VAR_INTERNAL, VAR_SLACK};
-
 /* Entries of the matrix, (stages, rows, variables): for the stage itself and the one before. */
 void reader_matrix(const mpc_state *state, real_t *here, real_t *before)
 {
@@ -15,12 +12,12 @@ void reader_matrix(const mpc_state *state, real_t *here, real_t *before)
         for (int32_t i = 0; i < MPC_VARS; i++) {
             real_t unit[MPC_VARS] = {REAL(0.0)};
             real_t value[MPC_ROWS];
-            unit[reader_order[i]] = REAL(1.0);
-            multiply(&state->stage[k], unit, nothing, value);
+            unit[i] = REAL(1.0);
+            rows_multiply(&state->stage[k], unit, nothing, value);
             for (int32_t r = 0; r < MPC_ROWS; r++) {
                 here[(((k * MPC_ROWS) + r) * MPC_VARS) + i] = value[r];
             }
-            multiply(&state->stage[k], nothing, unit, value);
+            rows_multiply(&state->stage[k], nothing, unit, value);
             for (int32_t r = 0; r < MPC_ROWS; r++) {
                 before[(((k * MPC_ROWS) + r) * MPC_VARS) + i] = value[r];
             }
@@ -39,7 +36,7 @@ static void reader_clip(const mpc_stage *stage, real_t dual, real_t *bound)
         probe.z[r] = REAL(0.0);
         probe.y[r] = dual;
     }
-    update(&probe, nothing);
+    rows_update_z_y(&probe, nothing);
     for (int32_t r = 0; r < MPC_ROWS; r++) {
         bound[r] = probe.z[r];
     }
@@ -63,9 +60,9 @@ void reader_columns(const mpc_state *state, real_t *gradient, real_t *hessian, r
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         const mpc_stage *const stage = &state->stage[k];
         for (int32_t i = 0; i < MPC_VARS; i++) {
-            gradient[(k * MPC_VARS) + i] = stage->q[reader_order[i]];
-            hessian[(k * MPC_VARS) + i] = stage->hessian[reader_order[i]];
-            scale[(k * MPC_VARS) + i] = stage->column[reader_order[i]];
+            gradient[(k * MPC_VARS) + i] = stage->q[i];
+            hessian[(k * MPC_VARS) + i] = stage->hessian[i];
+            scale[(k * MPC_VARS) + i] = stage->column[i];
         }
     }
 }

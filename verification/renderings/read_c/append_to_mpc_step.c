@@ -1,9 +1,6 @@
 
 /* For verification only, never part of a generated controller: values of a quadratic program. */
 
-static const int32_t reader_order[MPC_VARS] = {VAR_SOC,  VAR_T_CL,     VAR_P_ENG, VAR_ON,
-                                               VAR_FUEL, VAR_INTERNAL, VAR_SLACK};
-
 /* Make the values of a second, expanded about a plan: x in SI units, (stages, variables). Returns
  * the scale of the cost, in units of the solver per g. */
 real_t reader_prepare(mpc_state *state, const mpc_in *in, const real_t *x)
@@ -12,7 +9,7 @@ real_t reader_prepare(mpc_state *state, const mpc_in *in, const real_t *x)
     (void)check_measured(&state->good, in);
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         for (int32_t i = 0; i < MPC_VARS; i++) {
-            state->stage[k].x[reader_order[i]] = x[(k * MPC_VARS) + i];
+            state->stage[k].x[i] = x[(k * MPC_VARS) + i];
         }
     }
     state->phase = PHASE_RUNNING;

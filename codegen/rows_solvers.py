@@ -1,0 +1,170 @@
+"""C code of the solvers from the table of rows: what ADMM and OSQP do with the rows of a stage."""
+
+from collections.abc import Iterable
+
+from qpmpc.codegen.elimination import (
+    Elimination,
+    factor_type,
+    factorise,
+    local,
+    substitute,
+    weight,
+)
+from qpmpc.codegen.rows_c import (
+    bounds,
+    function,
+    header,
+    heat_h,
+    is_unit,
+    member,
+    of_pieces,
+    place,
+    product,
+    types_h,
+    values_h,
+    variable,
+)
+from qpmpc.qp.rows import ROWS, Entry, Var
+
+MATRIX = "const stage_matrix *const a = &stage->a;"
+
+
+def rows_files(scalars: Iterable[str], solver: str) -> dict[str, str]:
+    """Return the headers that are made from the table of rows, by name.
+
+    Parameters
+    ----------
+    scalars : names of the controller's parameters
+    solver : `admm` or `osqp`
+    """
+    names = list(scalars)
+    files = {
+        "mpc_heat.h": heat_h(names),
+        "mpc_rows.h": types_h(),
+        "mpc_rows_values.h": values_h(names),
+    }
+    if solver == "osqp":
+        return files | {"mpc_rows_osqp.h": osqp_h()}
+    return files | {"mpc_rows_factor.h": factor_h(), "mpc_rows_admm.h": admm_h()}
+
+
+def factor_h() -> str:
+    """Return `mpc_rows_factor.h`: the type of a stage's factor."""
+    what = "Factor of a stage."
+    return header("mpc_rows_factor.h", what, ["mpc_rows.h"], factor_type(Elimination()))
+
+
+def admm_h() -> str:
+    """Return `mpc_rows_admm.h`: the lines of an iteration, row by row."""
+    return header(
+        "mpc_rows_admm.h",
+        "The lines of ADMM, row by row.",
+        ["mpc_admm.h", "mpc_parts.h"],
+        _multiply(),
+        factorise(Elimination()),
+        _right_hand_side(),
+        substitute(Elimination()),
+        _update_z_y(),
+    )
+
+
+def osqp_h() -> str:
+    """Return `mpc_rows_osqp.h`: entries column by column, as OSQP keeps them, and bounds."""
+    return header(
+        "mpc_rows_osqp.h",
+        "The rows as OSQP has them.",
+        ["mpc_parts.h", "mpc_real.h"],
+        "#define UNLIMITED REAL(1.0e30)\n",
+        _put_columns(),
+        _put_bounds(),
+    )
+
+
+def _multiply() -> str:
+    lines = [MATRIX]
+    for row in ROWS:
+        lines += of_pieces(row, [f"value[{place(row)}] = {product(row)};"])
+    return function(
+        "void rows_multiply(const mpc_stage *stage, const real_t *x, const real_t *before,\n"
+        "                                 real_t *value)",
+        "value = Ax",
+        lines,
+    )
+
+
+def _right_hand_side() -> str:
+    lines = [MATRIX]
+    for var in Var:
+        start = f"(mpc_par.proximal * stage->x[{variable(var)}]) - stage->q[{variable(var)}]"
+        lines.append(f"real_t {local(var)} = {start};")
+    for row in ROWS:
+        at = place(row)
+        name = "w" if row.pieces else f"w_{row.name}"
+        weighted = f"({weight(row)} * stage->z[{at}]) - stage->y[{at}]"
+        inside = [f"const real_t {name} = {weighted};"]
+        for entry in row.terms:
+            sum_ = f"work_before[{variable(entry.var)}]" if entry.before else local(entry.var)
+            inside.append(f"{sum_} += {'' if is_unit(row) else f'{member(row, entry)} * '}{name};")
+        lines += of_pieces(row, inside)
+    lines += [f"stage->work[{variable(var)}] = {local(var)};" for var in Var]
+    return function(
+        "void rows_right_hand_side(mpc_stage *stage, real_t *work_before)",
+        "work = s x - q + A'(Rz - y); what the rows add to the stage before, too",
+        lines,
+    )
+
+
+def _update_z_y() -> str:
+    lines = [MATRIX, "const stage_bounds *const b = &stage->b;"]
+    lines.append("const real_t *const x = stage->work;")
+    for row in ROWS:
+        low, high = bounds(row)
+        at = f"&stage->z[{place(row)}], &stage->y[{place(row)}]"
+        if row.is_equality:
+            call = f"update_equality({product(row)}, {low}, {at});"
+        elif high is None:
+            call = f"update_above({product(row)}, {low}, {at});"
+        elif low is None:
+            call = f"update_below({product(row)}, {high}, {at});"
+        else:
+            call = f"update_between({product(row)}, {low}, {high}, {at});"
+        lines += of_pieces(row, [call])
+    return function(
+        "void rows_update_z_y(mpc_stage *stage, const real_t *before)",
+        "z and y of all rows from t, in `work`; `before` is that of the stage before.",
+        lines,
+    )
+
+
+def _put_columns() -> str:
+    lines = ["int32_t at = first;"]
+    for var in Var:
+        here, before = Entry(var, False), Entry(var, True)
+        for row in ROWS:
+            if here in row.terms:
+                value = "REAL(1.0)" if is_unit(row) else member(row, here)
+                lines += of_pieces(row, [f"values[at] = {value};", "at++;"])
+        for row in ROWS:
+            if before in row.terms:
+                value = member(row, before, "next")
+                lines += ["if (next != NULL) {", f"    values[at] = {value};", "    at++;", "}"]
+    return function(
+        "int32_t rows_put_columns(real_t *values, int32_t first, const stage_matrix *a,\n"
+        "                                       const stage_matrix *next)",
+        "Entries of a stage's columns, each from the first row down; returns where they end.",
+        [*lines, "return at;"],
+    )
+
+
+def _put_bounds() -> str:
+    lines = []
+    for row in ROWS:
+        low, high = bounds(row)
+        both = [f"low[{place(row)}] = {low or '-UNLIMITED'};"]
+        both.append(f"high[{place(row)}] = {high or 'UNLIMITED'};")
+        lines += of_pieces(row, both)
+    return function(
+        "void rows_put_bounds(real_t *low, real_t *high, const stage_bounds *b)",
+        "Bounds of a stage's rows.",
+        lines,
+    )

@@ -1,0 +1,101 @@
+"""The table's quantities and expressions in numpy, for all stages at once."""
+
+import ast
+from collections.abc import Mapping
+from functools import partial
+from types import CodeType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpmpc.preview.stages import Stages
+from qpmpc.pwa.model import PwaModel
+from qpmpc.qp import rows
+from qpmpc.qp.coolant import thermostat_step
+from qpmpc.qp.expressions import code_of, names_in, parsed, targets_of
+from qpmpc.qp.linearisation import Linearisation
+from qpmpc.vehicle import heat
+from qpmpc.vehicle.parameters import Thermal
+
+Floats = NDArray[np.float64]
+
+# What changes from step to step: a stage, the point it is expanded about, the state now.
+STAGE = ("duration_s", "net_w", "speed_mps", "internal_off_w")
+ABOUT = ("t_cl_degc", "fuel_g_per_s", "p_eng_w", "t_cl_start_degc", "t_cl_end_degc")
+INPUTS = (*STAGE, *(f"about_{name}" for name in ABOUT), "start_soc")
+ORIGIN = ("origin_soc", "origin_t_cl_degc")
+
+
+def pieces_of(model: PwaModel) -> dict[str, Floats]:
+    """Slopes and intercepts of the curves whose pieces make rows; shape (pieces,) each."""
+    return {
+        "fuel_slope": model.fuel.slope,
+        "fuel_intercept": model.fuel.intercept,
+        "battery_slope": model.battery.slope,
+        "battery_intercept": model.battery.intercept,
+    }
+
+
+class Quantities:
+    """Evaluates expressions of the table; what no step changes is evaluated once.
+
+    Arrays have shape (n, 1), one row a stage, or (1, pieces) and (n, pieces) in rows of a curve.
+
+    Parameters
+    ----------
+    parameters : numbers by name, see `qp_parameters`
+    thermal, model : of the coolant and of the PWA curves
+    stages : n
+    """
+
+    def __init__(
+        self, parameters: Mapping[str, float], thermal: Thermal, model: PwaModel, stages: int
+    ) -> None:
+        losses = heat.in_arithmetic(min=np.minimum, max=np.maximum)
+        is_last = np.zeros((stages, 1))
+        is_last[-1] = 1.0
+        self._names: dict[str, Any] = {
+            **{name: value for name, value in vars(rows).items() if name.isupper()},
+            **parameters,
+            **pieces_of(model),
+            **{f.__name__: partial(losses[f.__name__], thermal) for f in heat.FUNCTIONS},
+            **dict.fromkeys(ORIGIN, 0.0),
+            "is_last": is_last,
+            "min": np.minimum,
+            "max": np.maximum,
+            "where": np.where,
+            "running": partial(np.cumsum, axis=0),
+            "pwa_alpha": model.alpha,
+            "pwa_alpha_slope": model.alpha.active_slope,
+            "pwa_battery": model.battery,
+            "thermostat_step": partial(thermostat_step, thermal),
+        }
+        self._changing = set(INPUTS)
+        each_step: list[ast.stmt] = []
+        for line in parsed(rows.QUANTITIES):
+            if self.is_changing(line):
+                each_step.append(line)
+                self._changing.update(targets_of(line))
+            else:
+                exec(code_of([line]), self._names)
+        self._each_step = code_of(each_step)
+
+    def is_changing(self, formula: ast.AST) -> bool:
+        """Whether a formula's value changes from step to step."""
+        return not self._changing.isdisjoint(names_in(formula))
+
+    def update(self, stages: Stages, soc: float, about: Linearisation) -> dict[str, Any]:
+        """Evaluate all quantities for a horizon, and return them by name."""
+        names = self._names
+        for name in STAGE:
+            names[name] = getattr(stages, name)[:, None]
+        for name in ABOUT:
+            names[f"about_{name}"] = getattr(about, name)[:, None]
+        names["start_soc"] = soc
+        exec(self._each_step, names)
+        return names
+
+    def value(self, code: CodeType) -> Any:
+        """Evaluate an expression for what was last updated."""
+        return eval(code, self._names)

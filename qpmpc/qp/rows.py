@@ -1,0 +1,240 @@
+"""The one table of the QP: variables, the quantities its rows are made of, rows and cost.
+
+Everything else is made from it: the values in numpy (`StageQp`), the sparsity pattern, the C code
+and OSQP's order of columns (`qpmpc.codegen.rows_c`), and the table in the docs. A row is an
+equation in the variables of a stage; `soc_before` is `soc` of the stage before, for the first
+stage the state now. What its coefficients are made of are numbers of `qp_parameters`, the stage
+(`Stages`), the point it is expanded about (`Linearisation`), the pieces of the PWA curves, the
+constants below and QUANTITIES.
+
+States count from an origin. In numpy that is 0; in C it is the state at the start of the horizon,
+because small numbers keep the digits of single precision for what the plan changes.
+"""
+
+import ast
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+from typing import NamedTuple
+
+from qpmpc.qp.expressions import FormulaError, expression, terms_of
+
+SHORTEST_SCALE_S = 1.0  # a masked stage is scaled as one of 1 s
+REACH_MARGIN_SOC = 1e-5
+ACCURATE_STAGE_S = 1.0  # a stage of this length or less is known, a longer one is forecast
+SIGMA_FORCED = 0.99  # "engine must be on" as a lower bound on sigma, kept apart from the upper one
+
+
+class Var(IntEnum):
+    """Variables of a stage, in the order they stand in x, in Python and in C."""
+
+    SOC = 0  # at the end of the stage
+    T_CL = 1  # degC, at the end of the stage
+    P_ENG = 2  # E, mean engine power, W
+    ON = 3  # sigma, share of the stage with the engine on
+    FUEL = 4  # F, mean fuel rate of a hot engine, g/s
+    INTERNAL = 5  # G, mean internal battery power, W
+    T_SLACK = 6  # K beyond the coolant limits
+
+
+VARS = len(Var)
+
+
+class Variable(NamedTuple):
+    """Scaling of a variable: SI units in one of the solver's; a rate's shrink with duration."""
+
+    unit: str
+    is_rate: bool = False
+
+
+VARIABLES = {
+    Var.SOC: Variable("unit_soc"),
+    Var.T_CL: Variable("unit_t_k"),
+    Var.P_ENG: Variable("unit_power_w", is_rate=True),
+    Var.ON: Variable("1.0", is_rate=True),
+    Var.FUEL: Variable("unit_fuel_g_per_s", is_rate=True),
+    Var.INTERNAL: Variable("unit_power_w", is_rate=True),
+    Var.T_SLACK: Variable("unit_t_k"),
+}
+
+QUANTITIES = """
+# power limits of the engine while on; what the battery alone cannot give
+most_w = min(engine_max_w, net_w + battery_charge_max_w)
+missing_w = net_w - battery_discharge_max_w
+
+# SOC limits with the reserve of forecast stages and the terminal band, no higher than charging all
+# the way leads to: a limit above that is moot
+strongest_w = max(net_w - engine_max_w, -battery_charge_max_w)
+spent_soc = running(duration_s * pwa_battery(strongest_w) / battery_energy_j)
+reach_soc = start_soc - spent_soc - REACH_MARGIN_SOC
+limit_soc = soc_min + where(duration_s > ACCURATE_STAGE_S, soc_reserve, 0.0)
+last_low_soc = where(soc_penalty_g > 0.0, limit_soc, terminal_soc_low)
+last_high_soc = where(soc_penalty_g > 0.0, soc_max, terminal_soc_high)
+soc_low = min(where(is_last > 0.0, last_low_soc, limit_soc) - origin_soc, reach_soc)
+soc_high = where(is_last > 0.0, last_high_soc, soc_max) - origin_soc
+
+# heat into the coolant, expanded about (T^, F^, E^), T_mean the mean of the stage's ends:
+# q = (1 - x) [LHV (alpha F + growth (T_mean - T^)) - E] - UA (T_mean - T_amb) - Q_cabin
+share = 1.0 - exhaust_share
+alpha = pwa_alpha(about_t_cl_degc)
+growth = pwa_alpha_slope(about_t_cl_degc) * about_fuel_g_per_s
+ua = ua_w_per_k(speed_mps)
+w_per_k = ua - share * lhv_j_per_g * growth
+fixed_w = ua * (t_amb_degc - origin_t_cl_degc) - share * lhv_j_per_g * growth * (about_t_cl_degc - origin_t_cl_degc) - cabin_w(about_t_cl_degc)
+start_k = about_t_cl_start_degc - origin_t_cl_degc
+end_k = about_t_cl_end_degc - origin_t_cl_degc
+heat_w = share * (lhv_j_per_g * alpha * about_fuel_g_per_s - about_p_eng_w) + (fixed_w - w_per_k * 0.5 * (start_k + end_k))
+
+# what it makes of the coolant: T = T_end(q^, T^_start) + per_heat (q - q^)
+#                                   + per_start (T_before - T^_start)
+open_k = thermostat_open_degc - origin_t_cl_degc
+over_k, per_heat, per_start = thermostat_step(duration_s, start_k - open_k, heat_w)
+per_power = per_heat * share
+per_fuel = per_power * lhv_j_per_g * alpha
+per_end = 0.5 * per_heat * w_per_k
+settled_k = over_k + open_k + per_heat * (fixed_w - heat_w) - per_start * start_k
+
+growing = 0.5 * duration_s * growth
+"""  # noqa: E501 - a line of it is a formula
+
+
+class Entry(NamedTuple):
+    """A variable in a row, of the stage itself or of the one before."""
+
+    var: Var
+    before: bool
+
+    @property
+    def name(self) -> str:
+        """Its name in the table and in C."""
+        return self.var.name.lower() + ("_before" if self.before else "")
+
+
+ENTRIES = {entry.name: entry for var in Var for entry in (Entry(var, False), Entry(var, True))}
+
+
+def _terms(node: ast.expr) -> dict[Entry, ast.expr]:
+    return {ENTRIES[name]: factor for name, factor in terms_of(node, ENTRIES).items()}
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of a stage: sum of coefficient * variable, and its bounds.
+
+    Attributes
+    ----------
+    name : in Python, C and the docs
+    text : `terms == bound`, `terms >= bound`, `terms <= bound` or `bound <= terms <= bound`
+    pieces : the PWA curve (`fuel`, `battery`) of which each piece makes a row; empty for one row
+    """
+
+    name: str
+    text: str
+    pieces: str = ""
+
+    @cached_property
+    def _compared(self) -> tuple[ast.expr, ast.expr | None, ast.expr | None]:
+        """Terms, lower and upper bound."""
+        match expression(self.text):
+            case ast.Compare(left, [ast.Eq()], [bound]):
+                return left, bound, bound
+            case ast.Compare(left, [ast.GtE()], [bound]):
+                return left, bound, None
+            case ast.Compare(left, [ast.LtE()], [bound]):
+                return left, None, bound
+            case ast.Compare(low, [ast.LtE(), ast.LtE()], [terms, high]):
+                return terms, low, high
+        raise FormulaError(f"row {self.name}: no bounds in {self.text!r}")
+
+    @cached_property
+    def terms(self) -> dict[Entry, ast.expr]:
+        """Coefficient of each variable, in the order written."""
+        return _terms(self._compared[0])
+
+    @property
+    def low(self) -> ast.expr | None:
+        """Lower bound; None without."""
+        return self._compared[1]
+
+    @property
+    def high(self) -> ast.expr | None:
+        """Upper bound; None without."""
+        return self._compared[2]
+
+    @property
+    def is_equality(self) -> bool:
+        """Whether both bounds are one."""
+        return self.low is self.high
+
+    @property
+    def before(self) -> Entry | None:
+        """The state of the stage before that it contains."""
+        return next((entry for entry in self.terms if entry.before), None)
+
+
+ROWS = (
+    Row("soc", "soc - soc_before + duration_s / battery_energy_j * internal == 0.0"),
+    Row(
+        "t_cl",
+        "(1.0 + per_end) * t_cl + (per_end - per_start) * t_cl_before"
+        " + per_power * p_eng - per_fuel * fuel == settled_k",
+    ),
+    Row("fuel", "fuel - fuel_slope * p_eng - fuel_intercept * on >= 0.0", "fuel"),
+    Row(
+        "battery",
+        "internal + battery_slope * p_eng"
+        " - (net_w * battery_slope + battery_intercept - internal_off_w) * on >= internal_off_w",
+        "battery",
+    ),
+    Row("p_eng_max", "p_eng - most_w * on <= 0.0"),
+    Row("p_eng_min", "p_eng - engine_min_w * on >= max(missing_w - engine_min_w, 0.0)"),
+    Row("box_soc", "soc_low <= soc <= soc_high"),
+    Row("box_on", "where(missing_w > 0.0, SIGMA_FORCED, 0.0) <= on <= 1.0"),
+    Row("t_cl_min", "t_cl + t_slack >= t_min_degc - origin_t_cl_degc"),
+    Row("t_cl_max", "t_cl - t_slack <= t_max_degc - origin_t_cl_degc"),
+    Row("box_slack", "t_slack >= 0.0"),
+)
+
+# Cost of a stage in g: fuel as expanded, at the mean of the stage's ends, and slack.
+COST = (
+    "duration_s * alpha * fuel + growing * t_cl + growing * t_cl_before + slack_g_per_k * t_slack"
+)
+
+
+def cost_terms() -> dict[Entry, ast.expr]:
+    """Weight of each variable in the cost of a stage."""
+    return _terms(expression(COST))
+
+
+def states() -> list[Var]:
+    """Variables that a row of the stage after contains: they couple the stages."""
+    return [var for var in Var if any(Entry(var, True) in row.terms for row in ROWS)]
+
+
+class Rows:
+    """Where the rows of a stage stand in A; counts depend on the PWA curves.
+
+    Parameters
+    ----------
+    fuel, battery : pieces of the PWA curves
+
+    Attributes
+    ----------
+    count : rows of a stage
+    """
+
+    def __init__(self, fuel: int, battery: int) -> None:
+        self._pieces = {"": 1, "fuel": fuel, "battery": battery}
+        self._place: dict[str, slice] = {}
+        self.count = 0
+        for row in ROWS:
+            first, self.count = self.count, self.count + self._pieces[row.pieces]
+            self._place[row.name] = slice(first, self.count)
+
+    def __getitem__(self, name: str) -> slice:
+        """Rows of that name, within a stage."""
+        return self._place[name]
+
+    def first(self, name: str) -> int:
+        """Row of that name, or the first of them, within a stage."""
+        return int(self._place[name].start)

@@ -1,0 +1,127 @@
+"""C made from the table of rows: numbering, values, and a factor that leaves nothing out."""
+
+import ctypes
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from qpmpc.codegen import values_of
+from qpmpc.codegen.c_text import Writer
+from qpmpc.codegen.elimination import Elimination
+from qpmpc.codegen.generate import project_files
+from qpmpc.codegen.host_library import compiled, compiler
+from qpmpc.codegen.rows_c import FUNCTIONS, types_h, values_h
+from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.qp.expressions import FormulaError, code_of, expression
+from qpmpc.qp.rows import ROWS, VARS, Row, Rows, Var
+from qpmpc.qp.structure import QpStructure
+from qpmpc.vehicle import load_vehicle
+
+FUEL, BATTERY = 3, 4
+
+
+def values():
+    chosen = ControllerSettings()
+    return values_of(load_vehicle(), chosen.mh_qp, chosen.rule_based)
+
+
+def numbers(text: str) -> dict[str, int]:
+    """Enumerators of C's header, with counts of pieces put in."""
+    found: dict[str, int] = {"MPC_FUEL_PIECES": FUEL, "MPC_BATTERY_PIECES": BATTERY}
+    for name, value in re.findall(r"^    (\w+) = ([^,/\n]+)", text, re.MULTILINE):
+        found[name] = eval(value, {}, found)
+    return found
+
+
+def test_python_and_c_number_variables_rows_and_entries_alike() -> None:
+    found, rows = numbers(types_h()), Rows(fuel=FUEL, battery=BATTERY)
+    assert {f"VAR_{var.name}": var.value for var in Var}.items() <= found.items()
+    assert {f"ROW_{r.name.upper()}": rows.first(r.name) for r in ROWS}.items() <= found.items()
+    assert (found["MPC_VARS"], found["MPC_ROWS"]) == (VARS, rows.count)
+    structure = QpStructure(3, rows)
+    assert found["MPC_ENTRIES"] == len(structure.index)
+    assert found["MPC_ENTRIES_BEFORE"] == structure.entry_before.sum()
+
+
+def random_formula(rng: np.random.Generator, depth: int) -> str:
+    if depth == 0:
+        return str(rng.choice(["a", "b", "c", "2.0", "0.5"]))
+    one, two, three = (
+        random_formula(rng, depth - 1 - int(rng.integers(2)) * (depth > 1)) for _ in range(3)
+    )
+    kind = rng.integers(4)
+    if kind == 0:
+        return f"-({one})"
+    if kind == 1:
+        return f"{rng.choice(['min', 'max'])}({one}, {two})"
+    if kind == 2:
+        return f"where({one} > {two}, {three}, {one})"
+    return f"({one}) {rng.choice(list('+-*/'))} ({two})"
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+def test_c_has_the_value_of_the_formula_to_the_last_bit() -> None:
+    """Random formulas, compiled: parentheses, choices and literals lose nothing."""
+    rng = np.random.default_rng(5)
+    texts = [random_formula(rng, int(rng.integers(1, 5))) for _ in range(400)]
+    writer = Writer({name: f"x[{i}]" for i, name in enumerate("abc")}, FUNCTIONS)
+    lines = [f"y[{i}] = {writer.expression(expression(text))};" for i, text in enumerate(texts)]
+    project = project_files(values(), "host", "f64")
+    files = {name: project[name] for name in ("mpc_config.h", "mpc_real.h")}
+    body = "\n".join(lines)
+    files["formulas.c"] = (
+        f'#include "mpc_real.h"\nvoid evaluate(const real_t *x, real_t *y)\n{{\n{body}\n}}\n'
+    )
+    library = ctypes.CDLL(str(compiled(files)))
+    for x in rng.uniform(0.1, 10.0, (20, 3)):
+        found = np.empty(len(texts))
+        library.evaluate(x.ctypes.data_as(ctypes.c_void_p), found.ctypes.data_as(ctypes.c_void_p))
+        names = {"min": np.minimum, "max": np.maximum, "where": np.where}
+        names |= dict(zip("abc", x, strict=True))
+        with np.errstate(all="ignore"):
+            expected = [float(eval(code_of(expression(text)), names)) for text in texts]
+        np.testing.assert_array_equal(found, expected)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), stages=st.integers(1, 4))
+def test_the_factor_has_every_entry_that_elimination_makes(seed, stages) -> None:
+    """Dense Cholesky of A'A + I with random entries, in the order of elimination."""
+    rows = Rows(fuel=FUEL, battery=BATTERY)
+    structure, e = QpStructure(stages, rows), Elimination()
+    rng = np.random.default_rng(seed)
+    a = structure.matrix_of(structure.data(rng.uniform(0.5, 1.5, (stages, len(structure.index)))))
+    order = np.add.outer(np.arange(stages) * VARS, e.order).ravel()
+    normal = (a.T @ a).toarray()[np.ix_(order, order)] + np.eye(len(order))
+    factor = np.abs(np.linalg.cholesky(normal)) > 1e-9
+    expected = np.eye(len(order), dtype=bool)
+    at = {var: i for i, var in enumerate(e.order)}
+    for k in range(stages):
+        for pivot, column in e.own.items():
+            expected[[k * VARS + at[v] for v in column], k * VARS + at[pivot]] = True
+        for state, column in e.before.items() if k else ():
+            expected[[k * VARS + at[v] for v in column], (k - 1) * VARS + at[state]] = True
+    assert not (factor & ~expected).any()
+    assert expected.sum() - factor.sum() <= len(e.own)  # nothing but fill of the first stage more
+
+
+def test_a_new_variable_and_row_need_no_edit_of_the_factor(monkeypatch) -> None:
+    """A row more, with entries that no other has: its place in the factor is found."""
+    row = Row("extra", "internal + soc_before - 2.0 * t_slack <= 5.0")
+    monkeypatch.setattr("qpmpc.codegen.elimination.ROWS", (*ROWS, row))
+    e = Elimination()
+    assert Var.INTERNAL in e.own[Var.T_SLACK]
+    assert Var.T_SLACK in e.before[Var.SOC]
+    assert e.order[-2:] == [Var.SOC, Var.T_CL]
+
+
+def test_names_and_constructs_that_c_does_not_have_are_refused() -> None:
+    writer = Writer({"a": "a"}, FUNCTIONS)
+    for text in ("b", "sin(a)", "a == a", "where(a, a)"):
+        with pytest.raises(FormulaError):
+            writer.expression(expression(text))
+    with pytest.raises(FormulaError):
+        values_h(["t_amb_degc"])  # the other parameters are unknown
