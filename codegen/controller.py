@@ -1,7 +1,7 @@
 """The generated C controller behind the Python API of any controller."""
 
 import ctypes
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,13 @@ from qpmpc.vehicle.plant import Command, Plant
 Floats = NDArray[np.float64]
 RUNGS = ("", "shifted plan", "rule-based")
 FLAGS = {1: "bad measurement", 2: "bad preview", 4: "solver failed", 8: "warming up"}
+
+
+class Inputs(Protocol):
+    """Whatever fills in the C controller's input."""
+
+    def fill(self, seen: Observation, into: Any) -> None:
+        """Write all inputs of one step."""
 
 
 class InputBuilder:
@@ -64,9 +71,7 @@ class GeneratedController:
 
     name = "mh-qp"
 
-    def __init__(
-        self, library: HostLibrary, inputs: InputBuilder, start: Observation | None
-    ) -> None:
+    def __init__(self, library: HostLibrary, inputs: Inputs, start: Observation | None) -> None:
         self.solver_name = f"generated {library.precision}"
         self.library = library
         self._inputs = inputs

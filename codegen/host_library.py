@@ -91,6 +91,7 @@ class HostLibrary:
     ----------
     input_type, output_type : ctypes structures
     state_bytes : size of one controller's memory
+    functions : of the library, by their names in C
     """
 
     def __init__(self, file: Path, values: Values, precision: Precision) -> None:
@@ -100,8 +101,8 @@ class HostLibrary:
         self.input_type, self.output_type = structures(
             precision, sizes.short_stages, sizes.long_stages
         )
-        self._library = ctypes.CDLL(str(file))
-        found = [self._library.mpc_abi(i) for i in range(len(_ABI_NAMES))]
+        self.functions = ctypes.CDLL(str(file))
+        found = [self.functions.mpc_abi(i) for i in range(len(_ABI_NAMES))]
         self.state_bytes = found[_STATE]
         expected = [
             ABI_VERSION,
@@ -120,10 +121,10 @@ class HostLibrary:
         for name, have, want in zip(_ABI_NAMES, found, expected, strict=True):
             if have != want:
                 raise CodegenError(f"{file}: {name} is {have}, expected {want}")
-        self.init = self._library.mpc_init
-        self.depart = self._library.mpc_depart
-        self.step = self._library.mpc_step
-        self.plan = self._library.mpc_plan
+        self.init = self.functions.mpc_init
+        self.depart = self.functions.mpc_depart
+        self.step = self.functions.mpc_step
+        self.plan = self.functions.mpc_plan
 
 
 def build_host_library(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from qpmpc.codegen.forecast_values import fixed_block_s, forecast_scalars
 from qpmpc.controllers import mh_qp, planner, safety
 from qpmpc.controllers.mh_qp import PLAN_VALID_STEPS, MhQpSettings
 from qpmpc.controllers.planner import DEPARTURE_LINEARISATIONS, WARM_UP_STEPS
@@ -15,6 +16,7 @@ from qpmpc.qp import linearisation, stage_qp
 from qpmpc.qp.coolant import radiator_w_per_k
 from qpmpc.qp.stage_qp import T_CL_MAX_MARGIN_K
 from qpmpc.solvers import base
+from qpmpc.vehicle import demand
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.engine import OptimalLine
 from qpmpc.vehicle.parameters import Vehicle
@@ -47,6 +49,7 @@ CONSTANTS: dict[str, dict[str, float]] = {
         "LEAST_COST": stage_qp.LEAST_COST,
     },
     base.__name__: {"LARGEST_PLAUSIBLE": base.LARGEST_PLAUSIBLE},
+    demand.__name__: {"GRAVITY_MPS2": demand.GRAVITY_MPS2},
 }
 
 
@@ -98,6 +101,8 @@ class Values:
     iterations, departure_iterations : K of a step and of each linearisation before the trip
     departure_linearisations, plan_valid_steps, warm_up_steps : as the Python controller has them
     duration_exponent : of the column scaling
+    min_on_s : shortest engine run of the rules
+    block_s : length of a block; 0 where the trip's length sets it
     """
 
     vehicle: str
@@ -108,6 +113,7 @@ class Values:
     departure_iterations: int
     duration_exponent: float
     min_on_s: int
+    block_s: int
     departure_linearisations: int = DEPARTURE_LINEARISATIONS
     plan_valid_steps: int = PLAN_VALID_STEPS
     warm_up_steps: int = WARM_UP_STEPS
@@ -142,6 +148,7 @@ def values_of(
         **_plant(vehicle, line, maps),
         **_problem(vehicle, model, settings),
         **_rules(vehicle, rules),
+        **forecast_scalars(vehicle, settings.horizon),
     }
     if not settings.qp.soc_penalty_g:
         band = (scalars["terminal_soc_high"] - scalars["terminal_soc_low"]) / scalars["unit_soc"]
@@ -183,6 +190,7 @@ def values_of(
         departure_iterations=settings.osqp.cold_iterations,
         duration_exponent=settings.scaling.duration_exponent,
         min_on_s=rules.min_on_s,
+        block_s=fixed_block_s(settings.horizon),
     )
 
 

@@ -89,6 +89,16 @@ typedef struct {
     real_t rule_heat_off_degc;
     real_t rule_soc_forced;
     int32_t rule_min_on_s;
+    /* forecast: demand classes, and the chassis that makes demand of speed */
+    real_t class_hard_w;
+    real_t class_braking_w;
+    real_t mass_kg;
+    real_t rotating_mass_factor;
+    real_t road_load_a_n;
+    real_t road_load_b_n_per_mps;
+    real_t road_load_c_n_per_mps2;
+    real_t eta_drive;
+    real_t eta_regen;
 } mpc_model;
 
 extern const mpc_model mpc_par;
