@@ -11,6 +11,7 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 from numpy.typing import NDArray
 
 from qpmpc import __version__
+from qpmpc.codegen.examples import example_files
 from qpmpc.codegen.osqp_source import CONSTANT_ARRAYS, PREFIX, osqp_files, osqp_version
 from qpmpc.codegen.values import CONSTANTS, Values
 from qpmpc.errors import InputError
@@ -121,6 +122,7 @@ def project_files(
     context["osqp_sources"] = [name for name in of_osqp if name.endswith(".c")]
     for output, template in templates.items():
         files[output] = environment.get_template(template).render(context)
+    files |= example_files(target)
     return dict(sorted((files | of_osqp).items()))
 
 

@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from qpmpc.codegen.examples import is_example
 from qpmpc.codegen.generate import Precision, Solver, project_files
 from qpmpc.codegen.values import Values
 from qpmpc.errors import QpmpcError
@@ -196,7 +197,7 @@ def _build(files: Mapping[str, str], command: str, kept: Path) -> None:
         folder = Path(scratch)
         for name, text in files.items():
             write_text(folder / name, text)
-        sources = sorted(name for name in files if name.endswith(".c"))
+        sources = sorted(n for n in files if n.endswith(".c") and not is_example(n))
         result = subprocess.run(
             [command, *FLAGS.split(), "-o", "libmpc.so", *sources, "-lm"],
             cwd=folder,
