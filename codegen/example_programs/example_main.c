@@ -61,7 +61,8 @@ static int32_t read_trip(const char *name)
         steps = 0;
         while ((fine != 0) && (fgets(line, LINE_LENGTH, file) != NULL)) {
             double cell[4];
-            const int found = sscanf(line, "%lf,%lf,%lf,%lf", &cell[0], &cell[1], &cell[2], &cell[3]);
+            const int found =
+                sscanf(line, "%lf,%lf,%lf,%lf", &cell[0], &cell[1], &cell[2], &cell[3]);
             fine = ((found == 4) && (steps < LONGEST_S)) ? 1 : 0;
             if (fine != 0) {
                 demand_w[steps] = (real_t)cell[0];
@@ -72,7 +73,8 @@ static int32_t read_trip(const char *name)
             }
         }
         if (fine == 0) {
-            (void)fprintf(stderr, "%s: line %d is not demand_w,speed_mps,soc,t_cl_degc, or beyond %d s\n",
+            (void)fprintf(stderr,
+                          "%s: line %d is not demand_w,speed_mps,soc,t_cl_degc, or beyond %d s\n",
                           name, (int)steps + 2, LONGEST_S);
             steps = -1;
         }
