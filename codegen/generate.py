@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from qpmpc import __version__
 from qpmpc.codegen.examples import example_files
 from qpmpc.codegen.osqp_source import CONSTANT_ARRAYS, PREFIX, osqp_files, osqp_version
+from qpmpc.codegen.prefix import checked_prefix, with_prefix
 from qpmpc.codegen.values import CONSTANTS, Values
 from qpmpc.errors import InputError
 from qpmpc.files import check_folder, write_text
@@ -48,6 +49,7 @@ def generate(
     target: Target = "host",
     precision: Precision = "f32",
     solver: Solver = "admm",
+    prefix: str = "",
 ) -> list[Path]:
     """Write the C project of a controller; same input, same bytes.
 
@@ -58,6 +60,7 @@ def generate(
     target : `host` (shared library) or `cortex-m7` (bare metal, for QEMU's mps2-an500)
     precision : of all arithmetic
     solver : `admm`, written for this problem, or `osqp`, OSQP's own embedded code
+    prefix : before every name that begins with mpc_, see `with_prefix`
 
     Returns
     -------
@@ -66,10 +69,11 @@ def generate(
     Raises
     ------
     InputError
-        If target, precision or solver is unknown or the folder cannot be written to.
+        If target, precision or solver is unknown, the prefix cannot begin a name in C or the
+        folder cannot be written to.
     """
     check_folder(folder, "output folder")
-    files = project_files(values, target, precision, solver)
+    files = project_files(values, target, precision, solver, prefix)
     for name, text in files.items():
         write_text(folder / name, text)
     return [folder / name for name in files]
@@ -80,17 +84,19 @@ def project_files(
     target: Target = "host",
     precision: Precision = "f32",
     solver: Solver = "admm",
+    prefix: str = "",
 ) -> dict[str, str]:
     """Return the text of every file of the project, by name.
 
     Raises
     ------
     InputError
-        If target, precision or solver is unknown.
+        If target, precision or solver is unknown or the prefix cannot begin a name in C.
     """
     one_of(target, TARGETS, "target")
     one_of(precision, PRECISIONS, "precision")
     one_of(solver, SOLVERS, "solver")
+    checked_prefix(prefix)
     root = resources.files("qpmpc.codegen")
     files = {p.name: p.read_text("utf-8") for p in _sorted(root / "runtime")}
     of_osqp: dict[str, str] = {}
@@ -123,7 +129,7 @@ def project_files(
     for output, template in templates.items():
         files[output] = environment.get_template(template).render(context)
     files |= example_files(target)
-    return dict(sorted((files | of_osqp).items()))
+    return with_prefix(dict(sorted((files | of_osqp).items())), prefix)
 
 
 def one_of(name: str, names: tuple[Name, ...], what: str) -> Name:

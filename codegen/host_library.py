@@ -95,7 +95,7 @@ class HostLibrary:
     functions : of the library, by their names in C
     """
 
-    def __init__(self, file: Path, values: Values, precision: Precision) -> None:
+    def __init__(self, file: Path, values: Values, precision: Precision, prefix: str = "") -> None:
         sizes = values.sizes
         self.values, self.precision = values, precision
         self.real = ctypes.c_float if precision == "f32" else ctypes.c_double
@@ -103,7 +103,8 @@ class HostLibrary:
             precision, sizes.short_stages, sizes.long_stages
         )
         self.functions = ctypes.CDLL(str(file))
-        found = [self.functions.mpc_abi(i) for i in range(len(_ABI_NAMES))]
+        abi = getattr(self.functions, f"{prefix}mpc_abi")
+        found = [abi(i) for i in range(len(_ABI_NAMES))]
         self.state_bytes = found[_STATE]
         expected = [
             ABI_VERSION,
@@ -122,10 +123,10 @@ class HostLibrary:
         for name, have, want in zip(_ABI_NAMES, found, expected, strict=True):
             if have != want:
                 raise CodegenError(f"{file}: {name} is {have}, expected {want}")
-        self.init = self.functions.mpc_init
-        self.depart = self.functions.mpc_depart
-        self.step = self.functions.mpc_step
-        self.plan = self.functions.mpc_plan
+        self.init = getattr(self.functions, f"{prefix}mpc_init")
+        self.depart = getattr(self.functions, f"{prefix}mpc_depart")
+        self.step = getattr(self.functions, f"{prefix}mpc_step")
+        self.plan = getattr(self.functions, f"{prefix}mpc_plan")
 
 
 def build_host_library(

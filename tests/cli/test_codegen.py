@@ -99,6 +99,8 @@ def test_writing_again_replaces_its_files_and_leaves_others_alone(cli, tmp_path)
         (["out", "--set", "mh_qp.horizon.blocks=0"], ["mh_qp.horizon.blocks"]),
         (["out", "--set", "mh_qp.qp.terminal_high=1"], ["terminal_high"]),
         (["out", "--solver", "osqp", "--set", "mh_qp.osqp.sigma=1.2345678e-18"], ["sigma"]),
+        (["out", "--prefix", "2nd_"], ["2nd_", "letter"]),
+        (["out", "--prefix", "my-car_"], ["my-car_", "letter"]),
         (["file"], ["file"]),
         (["file/deeper"], ["file"]),
     ],
