@@ -2,7 +2,7 @@
 
 import ctypes
 from time import perf_counter
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from qpmpc.codegen.host_library import build_host_library
 from qpmpc.codegen.values import values_of
 from qpmpc.controllers.base import Controller, Decision, Progress
 from qpmpc.controllers.settings import ControllerSettings, MhQpSettings
+from qpmpc.preview.forecast import Trace
 from qpmpc.preview.stages import StageBuilder
 from qpmpc.qp.rows import VARS
 from qpmpc.trip import Observation, Trip
@@ -22,20 +23,26 @@ RUNGS = ("", "shifted plan", "rule-based")
 FLAGS = {1: "bad measurement", 2: "bad preview", 4: "solver failed", 8: "warming up"}
 
 
+class Inputs(Protocol):
+    """Whatever fills in the C controller's input."""
+
+    def fill(self, seen: Observation, into: Any) -> None:
+        """Write all inputs of one step."""
+
+
 class InputBuilder:
     """Fills the C controller's input from a trip, as a navigation system would.
 
     Parameters
     ----------
-    trip : whose truth the short horizon sees, and whose forecast the long one
-    of_qp : layout of the horizon
+    preview : cuts the trip into stages
+    truth : what the short horizon sees
     """
 
-    def __init__(self, trip: Trip, of_qp: MhQpSettings) -> None:
-        truth = trip.truth
-        self._preview = StageBuilder(trip.vehicle, truth, trip.forecast, of_qp.horizon)
+    def __init__(self, preview: StageBuilder, truth: Trace) -> None:
+        self._preview = preview
         self._steps = truth.steps
-        self._short = of_qp.horizon.short_stages
+        self._short = preview.settings.short_stages
         padding = np.zeros(self._short)
         self._demand_w = np.concatenate([truth.demand_w, padding])
         self._speed_mps = np.concatenate([truth.speed_mps, padding])
@@ -67,6 +74,7 @@ class GeneratedController(Controller):
 
     Attributes
     ----------
+    inputs : fills in what the C code is given each second; `ForecastInputs` does that in C too
     fill_s, call_s : wall time of the last step, s: of filling in its input, and of the C call
 
     Raises
@@ -95,7 +103,7 @@ class GeneratedController(Controller):
         values = values_of(trip.vehicle, self.of_qp, self.settings.rule_based, blocks)
         self.library = build_host_library(values, precision)
         self.fill_s = self.call_s = 0.0
-        self._inputs = InputBuilder(trip, self.of_qp)
+        self.inputs: Inputs = InputBuilder(trip.preview(self.of_qp.horizon), trip.truth)
         self._state = ctypes.create_string_buffer(self.library.state_bytes)
         self._in, self._out = self.library.input_type(), self.library.output_type()
         self._arguments = (self._state, ctypes.byref(self._in), ctypes.byref(self._out))
@@ -104,14 +112,14 @@ class GeneratedController(Controller):
         """Set a defined state; prepare the first plan, unless the settings leave that out."""
         self.forget()
         if self.of_qp.prepared:
-            self._inputs.fill(self.trip.start, self._in)
+            self.inputs.fill(self.trip.start, self._in)
             while self.library.depart(self._state, ctypes.byref(self._in)) > 0:
                 pass
 
     def step(self, seen: Observation) -> Decision:
         """Run one step in C."""
         start = perf_counter()
-        self._inputs.fill(seen, self._in)
+        self.inputs.fill(seen, self._in)
         filled = perf_counter()
         self.library.step(*self._arguments)
         self.fill_s, self.call_s = filled - start, perf_counter() - filled

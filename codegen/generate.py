@@ -11,7 +11,9 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 from numpy.typing import NDArray
 
 from qpmpc._version import __version__
+from qpmpc.codegen.examples import example_files
 from qpmpc.codegen.osqp_source import CONSTANT_ARRAYS, PREFIX, osqp_files, osqp_version
+from qpmpc.codegen.prefix import checked_prefix, with_prefix
 from qpmpc.codegen.rows_solvers import rows_files
 from qpmpc.codegen.values import CONSTANTS, Values
 from qpmpc.errors import InputError
@@ -48,6 +50,7 @@ def generate(
     target: Target = "host",
     precision: Precision = "f32",
     solver: Solver = "admm",
+    prefix: str = "",
 ) -> list[Path]:
     """Write the C project of a controller; same input, same bytes.
 
@@ -58,6 +61,7 @@ def generate(
     target : `host` (shared library) or `cortex-m7` (bare metal, for QEMU's mps2-an500)
     precision : of all arithmetic
     solver : `admm`, written for this problem, or `osqp`, OSQP's own embedded code
+    prefix : before every name that begins with mpc_, see `with_prefix`
 
     Returns
     -------
@@ -66,10 +70,11 @@ def generate(
     Raises
     ------
     InputError
-        If target, precision or solver is unknown or the folder cannot be written to.
+        If target, precision or solver is unknown, the prefix cannot begin a name in C or the
+        folder cannot be written to.
     """
     check_folder(folder, "output folder")
-    files = project_files(values, target, precision, solver)
+    files = project_files(values, target, precision, solver, prefix)
     for name, text in files.items():
         write_text(folder / name, text)
     return [folder / name for name in files]
@@ -80,17 +85,19 @@ def project_files(
     target: Target = "host",
     precision: Precision = "f32",
     solver: Solver = "admm",
+    prefix: str = "",
 ) -> dict[str, str]:
     """Return the text of every file of the project, by name.
 
     Raises
     ------
     InputError
-        If target, precision or solver is unknown.
+        If target, precision or solver is unknown or the prefix cannot begin a name in C.
     """
     one_of(target, TARGETS, "target")
     one_of(precision, PRECISIONS, "precision")
     one_of(solver, SOLVERS, "solver")
+    checked_prefix(prefix)
     root = resources.files("qpmpc.codegen")
     files = {p.name: p.read_text("utf-8") for p in _sorted(root / "runtime")}
     files |= rows_files(values.scalars, solver)
@@ -124,7 +131,8 @@ def project_files(
     context["osqp_sources"] = [name for name in of_osqp if name.endswith(".c")]
     for output, template in templates.items():
         files[output] = environment.get_template(template).render(context)
-    return dict(sorted((files | of_osqp).items()))
+    files |= example_files(target)
+    return with_prefix(dict(sorted((files | of_osqp).items())), prefix)
 
 
 def one_of(name: str, names: tuple[Name, ...], what: str) -> Name:

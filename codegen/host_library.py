@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from qpmpc.codegen.examples import is_example
 from qpmpc.codegen.generate import Precision, Solver, project_files
 from qpmpc.codegen.values import Values
 from qpmpc.errors import QpmpcError
@@ -91,17 +92,19 @@ class HostLibrary:
     ----------
     input_type, output_type : ctypes structures
     state_bytes : size of one controller's memory
+    functions : of the library, by their names in C
     """
 
-    def __init__(self, file: Path, values: Values, precision: Precision) -> None:
+    def __init__(self, file: Path, values: Values, precision: Precision, prefix: str = "") -> None:
         sizes = values.sizes
         self.values, self.precision = values, precision
         self.real = ctypes.c_float if precision == "f32" else ctypes.c_double
         self.input_type, self.output_type = structures(
             precision, sizes.short_stages, sizes.long_stages
         )
-        self._library = ctypes.CDLL(str(file))
-        found = [self._library.mpc_abi(i) for i in range(len(_ABI_NAMES))]
+        self.functions = ctypes.CDLL(str(file))
+        abi = getattr(self.functions, f"{prefix}mpc_abi")
+        found = [abi(i) for i in range(len(_ABI_NAMES))]
         self.state_bytes = found[_STATE]
         expected = [
             ABI_VERSION,
@@ -120,10 +123,10 @@ class HostLibrary:
         for name, have, want in zip(_ABI_NAMES, found, expected, strict=True):
             if have != want:
                 raise CodegenError(f"{file}: {name} is {have}, expected {want}")
-        self.init = self._library.mpc_init
-        self.depart = self._library.mpc_depart
-        self.step = self._library.mpc_step
-        self.plan = self._library.mpc_plan
+        self.init = getattr(self.functions, f"{prefix}mpc_init")
+        self.depart = getattr(self.functions, f"{prefix}mpc_depart")
+        self.step = getattr(self.functions, f"{prefix}mpc_step")
+        self.plan = getattr(self.functions, f"{prefix}mpc_plan")
 
 
 def build_host_library(
@@ -195,7 +198,7 @@ def _build(files: Mapping[str, str], command: str, kept: Path) -> None:
         folder = Path(scratch)
         for name, text in files.items():
             write_text(folder / name, text)
-        sources = sorted(name for name in files if name.endswith(".c"))
+        sources = sorted(n for n in files if n.endswith(".c") and not is_example(n))
         result = subprocess.run(
             [command, *FLAGS.split(), "-o", "libmpc.so", *sources, "-lm"],
             cwd=folder,

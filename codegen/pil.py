@@ -148,7 +148,8 @@ class _OnTarget(Controller):
     ) -> None:
         super().__init__(trip, settings)
         self.solver_name = label
-        self._target, self._inputs = target, InputBuilder(trip, self.settings.mh_qp)
+        horizon = self.settings.mh_qp.horizon
+        self._target, self._inputs = target, InputBuilder(trip.preview(horizon), trip.truth)
         self._in = target.input_type()
         self.departure_instructions: list[int] = []
         self.instructions: list[int] = []

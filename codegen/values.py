@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from qpmpc.codegen.forecast_values import fixed_block_s, forecast_scalars
 from qpmpc.controllers import qp_planner, receding_horizon, safety
 from qpmpc.controllers.qp_planner import DEPARTURE_LINEARISATIONS, WARM_UP_STEPS
 from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS
@@ -17,6 +18,7 @@ from qpmpc.qp.rows import Rows
 from qpmpc.qp.stage_qp import qp_parameters
 from qpmpc.solvers import base
 from qpmpc.solvers.settings import AdmmSettings
+from qpmpc.vehicle import demand
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.engine import OptimalLine
 from qpmpc.vehicle.parameters import Vehicle
@@ -47,6 +49,7 @@ CONSTANTS: dict[str, dict[str, float]] = {
     stage_qp.__name__: {"LEAST_COST": stage_qp.LEAST_COST},
     rows.__name__: {name: value for name, value in vars(rows).items() if isinstance(value, float)},
     base.__name__: {"LARGEST_PLAUSIBLE": base.LARGEST_PLAUSIBLE},
+    demand.__name__: {"GRAVITY_MPS2": demand.GRAVITY_MPS2},
 }
 
 
@@ -98,6 +101,8 @@ class Values:
     iterations, departure_iterations : K of a step and of each linearisation before the trip
     departure_linearisations, plan_valid_steps, warm_up_steps : as the Python controller has them
     duration_exponent : of the column scaling
+    min_on_s : shortest engine run of the rules
+    block_s : length of a block; 0 where the trip's length sets it
     """
 
     vehicle: str
@@ -108,6 +113,7 @@ class Values:
     departure_iterations: int
     duration_exponent: float
     min_on_s: int
+    block_s: int
     departure_linearisations: int = DEPARTURE_LINEARISATIONS
     plan_valid_steps: int = PLAN_VALID_STEPS
     warm_up_steps: int = WARM_UP_STEPS
@@ -144,6 +150,7 @@ def values_of(
         **_plant(vehicle, line, maps),
         **_solver(settings.admm),
         **_rules(vehicle, rules),
+        **forecast_scalars(vehicle, settings.horizon),
     }
     if not settings.qp.soc_penalty_g:
         band = (scalars["terminal_soc_high"] - scalars["terminal_soc_low"]) / scalars["unit_soc"]
@@ -182,6 +189,7 @@ def values_of(
         departure_iterations=settings.admm.cold_iterations,
         duration_exponent=settings.scaling.duration_exponent,
         min_on_s=rules.min_on_s,
+        block_s=fixed_block_s(settings.horizon),
     )
 
 

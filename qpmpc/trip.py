@@ -8,6 +8,8 @@ import numpy as np
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.errors import InputError
 from qpmpc.preview.forecast import Trace
+from qpmpc.preview.horizon import HorizonSettings
+from qpmpc.preview.stages import StageBuilder
 from qpmpc.vehicle import DEFAULT_VEHICLE, Plant, PlantState, Vehicle, load_vehicle
 
 
@@ -87,6 +89,10 @@ class Trip:
     def start(self) -> Observation:
         """Observation at departure."""
         return self.observation(0, self.plant.initial_state())
+
+    def preview(self, horizon: HorizonSettings) -> StageBuilder:
+        """Return what cuts the road ahead into stages, at any second."""
+        return StageBuilder(self.vehicle, self.truth, self.forecast, horizon)
 
     def with_forecast(self, forecast: Trace | Cycle | None) -> "Trip":
         """Return the same trip with another forecast; the truth if None."""

@@ -34,12 +34,18 @@ int32_t check_measured(mpc_measured *good, const mpc_in *in)
     return fine;
 }
 
+/* What can be said of one second of a road. */
+int32_t check_second(real_t demand_w, real_t speed_mps)
+{
+    return within(demand_w, -LARGEST_POWER_W, LARGEST_POWER_W)
+           & within(speed_mps, REAL(0.0), LARGEST_SPEED_MPS);
+}
+
 int32_t check_preview(const mpc_in *in)
 {
     int32_t fine = ((in->short_count >= 1) && (in->short_count <= MPC_SHORT)) ? 1 : 0;
     for (int32_t k = 0; k < MPC_SHORT; k++) {
-        fine &= within(in->short_demand_w[k], -LARGEST_POWER_W, LARGEST_POWER_W);
-        fine &= within(in->short_speed_mps[k], REAL(0.0), LARGEST_SPEED_MPS);
+        fine &= check_second(in->short_demand_w[k], in->short_speed_mps[k]);
     }
     for (int32_t k = 0; k < MPC_LONG; k++) {
         fine &= within(in->long_duration_s[k], REAL(0.0), LONGEST_STAGE_S);

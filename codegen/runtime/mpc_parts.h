@@ -55,6 +55,7 @@ int32_t solver_iterate(mpc_state *state, int32_t count);
 mpc_command safety_admissible(mpc_command wish, const mpc_measured *seen);
 mpc_command rules_decide(rule_memory *memory, const mpc_measured *seen);
 int32_t check_measured(mpc_measured *good, const mpc_in *in);
+int32_t check_second(real_t demand_w, real_t speed_mps);
 int32_t check_preview(const mpc_in *in);
 
 #endif

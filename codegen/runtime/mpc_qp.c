@@ -5,18 +5,12 @@
  * T_k being the mean coolant temperature of stage k. Scaling: columns by unit and duration, rows
  * to unit norm, cost so that its largest fuel entry is 1. 
  */
+#include "mpc_battery_side.h"
 #include "mpc_constants.h"
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
 #include "mpc_rows_values.h"
-
-/* Net power asked of engine and battery: braking beyond the charge limit is for the brakes. */
-static real_t battery_side_w(real_t demand_w)
-{
-    return real_clip(demand_w + mpc_par.aux_power_w, -mpc_par.battery_charge_max_w,
-                     mpc_par.battery_discharge_max_w + mpc_par.engine_max_w);
-}
 
 /* Preview to stages: seconds first, then the classes of each block; what is past is masked. */
 void qp_road(mpc_state *state, const mpc_in *in)

@@ -31,6 +31,15 @@ def codegen(
             metavar="K", help="Solver iterations a step; as the controller's.", show_default=False
         ),
     ] = None,
+    prefix: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME_",
+            help="Before every name in the C code, so that several controllers link into one "
+            "program.",
+            show_default=False,
+        ),
+    ] = "",
     vehicle: VehicleOption = "prius-nimh",
     set_: SetOption = None,
 ) -> None:
@@ -43,21 +52,25 @@ def codegen(
       qpmpc codegen firmware --target cortex-m7 --precision f32 --iterations 25
 
       qpmpc codegen with_osqp --solver osqp --precision f64
+
+      qpmpc codegen prius_c --vehicle prius-liion --prefix liion_
     """
     from qpmpc.cli.console import result_console
     from qpmpc.cli.inputs import load_vehicle_and_settings
     from qpmpc.codegen.generate import PRECISIONS, SOLVERS, TARGETS, generate, one_of
+    from qpmpc.codegen.prefix import checked_prefix
     from qpmpc.codegen.values import values_of
 
     of_target = one_of(target, TARGETS, "target")
     of_precision = one_of(precision, PRECISIONS, "precision")
     of_solver = one_of(solver, SOLVERS, "solver")
+    checked_prefix(prefix)
     overrides = list(set_ or [])
     if iterations is not None:
         overrides.append(f"mh_qp.admm.iterations={iterations}")
     car, settings = load_vehicle_and_settings(vehicle, overrides)
     values = values_of(car, settings.mh_qp, settings.rule_based)
-    files = generate(values, folder, of_target, of_precision, of_solver)
+    files = generate(values, folder, of_target, of_precision, of_solver, prefix)
     sizes = values.sizes
     result_console().print(
         f"{folder}: {len(files)} files written, target {target}, {precision}, solver {solver}, "

@@ -5,7 +5,6 @@ from typing import Any
 from qpmpc.controllers.receding_horizon import Plan, Planner
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.errors import QpmpcError
-from qpmpc.preview.stages import StageBuilder
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.cvxpy_twin import CvxpyTwin
 from qpmpc.qp.linearisation import Linearisation
@@ -36,7 +35,7 @@ class CvxpyPlanner(Planner):
         super().__init__(trip, settings)
         of_qp, vehicle = self.settings.mh_qp, trip.vehicle
         self.solver_name = f"cvxpy {self.solver.lower()}"
-        self.preview = StageBuilder(vehicle, trip.truth, trip.forecast, of_qp.horizon)
+        self.preview = trip.preview(of_qp.horizon)
         model = PwaModel.of(vehicle, of_qp.pwa)
         self.program = CvxpyTwin(vehicle, model, self.preview.count, of_qp.qp)
         self.program.add(*self.terms(self.program))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from qpmpc.controllers.receding_horizon import Plan, Planner, power_while_on_w
 from qpmpc.controllers.settings import ControllerSettings, MhQpSettings
 from qpmpc.errors import InputError
-from qpmpc.preview.stages import StageBuilder, Stages
+from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.rows import VARS, Var
@@ -111,7 +111,7 @@ class QpPlanner(Planner):
         self.solver_name = self.solver.name
         self.on_solve = on_solve
         vehicle = trip.vehicle
-        self.preview = StageBuilder(vehicle, trip.truth, trip.forecast, self.of_qp.horizon)
+        self.preview = trip.preview(self.of_qp.horizon)
         self.model = PwaModel.of(vehicle, self.of_qp.pwa)
         self.qp = StageQp(
             vehicle, self.model, self.preview.count, self.of_qp.qp, self.of_qp.scaling

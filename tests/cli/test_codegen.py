@@ -102,6 +102,8 @@ def test_writing_again_replaces_its_files_and_leaves_others_alone(cli, tmp_path)
             ["out", "--solver", "osqp", "--set", "mh_qp.admm.proximal_weight=1.2345678e-18"],
             ["proximal_weight"],
         ),
+        (["out", "--prefix", "2nd_"], ["2nd_", "letter"]),
+        (["out", "--prefix", "my-car_"], ["my-car_", "letter"]),
         (["file"], ["file"]),
         (["file/deeper"], ["file"]),
     ],

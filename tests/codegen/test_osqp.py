@@ -263,7 +263,7 @@ def probed(files, tmp_path) -> tuple[HostLibrary, ctypes.c_int]:
     )
     adapter = adapter[:first] + declared + adapter[first:]
     library = library_of(files | {"mpc_osqp.c": adapter, "probe.c": PROBE_C}, tmp_path)
-    return library, ctypes.c_int.in_dll(library._library, "probe_fault")
+    return library, ctypes.c_int.in_dll(library.functions, "probe_fault")
 
 
 STATUSES = {  # osqp_api_constants.h
@@ -313,10 +313,10 @@ def test_settings_that_change_the_work_or_the_problem_are_refused(probed, change
     library, _ = probed
     ours = controller(library)
     assert next(drive(ours, 1))[0].fallback == ""
-    library._library.probe_set(*changed)
+    library.functions.probe_set(*changed)
     flags = [ours._out.flags for _ in drive(ours, 3)]
     assert flags == [SOLVER_FAILED] * 3
-    library._library.probe_set(0, 0, 0)
+    library.functions.probe_set(0, 0, 0)
 
 
 def test_nothing_of_another_trip_or_of_a_nan_is_left_in_the_workspace(files, tmp_path) -> None:

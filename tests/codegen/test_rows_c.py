@@ -14,7 +14,7 @@ from qpmpc.codegen.elimination import Elimination
 from qpmpc.codegen.generate import project_files
 from qpmpc.codegen.host_library import compiled, compiler
 from qpmpc.codegen.rows_c import FUNCTIONS, types_h, values_h
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.qp.expressions import FormulaError, code_of, expression
 from qpmpc.qp.rows import ROWS, VARS, Row, Rows, Var
 from qpmpc.qp.structure import QpStructure

@@ -9,7 +9,6 @@ from pydantic import BaseModel, ConfigDict, Field
 from qpmpc.controllers.receding_horizon import ON_THRESHOLD, Plan, Planner
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.preview.horizon import HorizonSettings
-from qpmpc.preview.stages import StageBuilder
 from qpmpc.qp.stage_qp import QpSettings
 from qpmpc.trip import Observation, Trip
 from qpmpc.verification.nonlinear.problem import NlpProblem, NlpVar
@@ -64,7 +63,7 @@ class MhNlp(Planner):
         of_qp = self.settings.mh_qp
         self.of_nlp = of_nlp or MhNlpSettings(horizon=of_qp.horizon, qp=of_qp.qp)
         horizon, vehicle = self.of_nlp.horizon, trip.vehicle
-        self.preview = StageBuilder(vehicle, trip.truth, trip.forecast, horizon)
+        self.preview = trip.preview(horizon)
         count, short = self.preview.count, horizon.short_stages
         self.solver = NlpSolver(NlpProblem(vehicle, count, short, self.of_nlp.qp))
         self._shift = self.preview.shift()

@@ -14,7 +14,7 @@ from qpmpc.codegen.host_library import compiler
 from qpmpc.codegen.values import values_of
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.errors import QpmpcError
-from qpmpc.preview.stages import StageBuilder, Stages
+from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.cvxpy_twin import CvxpyTwin
 from qpmpc.qp.linearisation import Linearisation
@@ -103,7 +103,7 @@ class Renderings:
     def __init__(self, trip: Trip, settings: ControllerSettings) -> None:
         chosen, vehicle = settings.mh_qp, trip.vehicle
         model = PwaModel.of(vehicle, chosen.pwa)
-        self.preview = StageBuilder(vehicle, trip.truth, trip.forecast, chosen.horizon)
+        self.preview = trip.preview(chosen.horizon)
         stages = self.preview.count
         self.qp = StageQp(vehicle, model, stages, chosen.qp, chosen.scaling)
         self.twin = CvxpyTwin(vehicle, model, stages, chosen.qp)
@@ -113,7 +113,7 @@ class Renderings:
             blocks = chosen.horizon.block_count(trip.forecast.steps)
             to_the_end = settings.with_settings({"mh_qp.admm.rho": C_RHO})
             values = values_of(vehicle, to_the_end.mh_qp, settings.rule_based, blocks)
-            self.generated = GeneratedQp(values, InputBuilder(trip, chosen))
+            self.generated = GeneratedQp(values, InputBuilder(self.preview, trip.truth))
         self._solver = Piqp(EXACT)
         self._is_set_up = False
 

@@ -1,0 +1,128 @@
+/* A trip on this machine: take it as a forecast, depart, decide second by second, print commands.
+ *
+ *     make example
+ *     ./example                          a built-in trip of a minute
+ *     ./example TRIP.csv > commands.csv
+ *
+ * TRIP.csv has a heading and then one line per second of the trip: demand_w,speed_mps,soc,t_cl_degc.
+ * Demand and speed are both the forecast and what comes true. SOC and coolant temperature are those
+ * measured at the start of the second; there is no car in this program that would make them.
+ */
+#include <stdio.h>
+
+#include "mpc_forecast.h"
+
+#define LONGEST_S 7200
+#define LINE_LENGTH 256
+
+static real_t demand_w[LONGEST_S];
+static real_t speed_mps[LONGEST_S];
+static real_t soc[LONGEST_S];
+static real_t t_cl_degc[LONGEST_S];
+
+static mpc_state state;
+static mpc_forecast forecast;
+
+/* Launch, a hill, braking to a stop: from speeds as a navigation system has them. */
+static int32_t built_in_trip(void)
+{
+    static const int32_t steps = 60;
+    real_t speed = (real_t)0.0;
+    for (int32_t k = 0; k < steps; k++) {
+        real_t accel = (real_t)0.0;
+        if (k < 15) {
+            accel = (real_t)1.0;
+        } else if (k >= 50) {
+            accel = (real_t)-1.5;
+        } else {
+            /* steady */
+        }
+        const real_t grade = ((k >= 25) && (k < 40)) ? (real_t)0.03 : (real_t)0.0;
+        const real_t mean = speed + ((real_t)0.5 * accel);
+        demand_w[k] = mpc_demand_w(mean, accel, grade);
+        speed_mps[k] = mean;
+        soc[k] = (real_t)0.6;
+        t_cl_degc[k] = (real_t)50.0;
+        speed += accel;
+    }
+    return steps;
+}
+
+/* Returns the number of seconds, or -1. */
+static int32_t read_trip(const char *name)
+{
+    char line[LINE_LENGTH];
+    int32_t steps = -1;
+    FILE *const file = fopen(name, "r");
+    if (file == NULL) {
+        (void)fprintf(stderr, "%s: cannot be read\n", name);
+    } else {
+        int32_t fine = (fgets(line, LINE_LENGTH, file) != NULL) ? 1 : 0; /* the heading */
+        steps = 0;
+        while ((fine != 0) && (fgets(line, LINE_LENGTH, file) != NULL)) {
+            double cell[4];
+            const int found =
+                sscanf(line, "%lf,%lf,%lf,%lf", &cell[0], &cell[1], &cell[2], &cell[3]);
+            fine = ((found == 4) && (steps < LONGEST_S)) ? 1 : 0;
+            if (fine != 0) {
+                demand_w[steps] = (real_t)cell[0];
+                speed_mps[steps] = (real_t)cell[1];
+                soc[steps] = (real_t)cell[2];
+                t_cl_degc[steps] = (real_t)cell[3];
+                steps++;
+            }
+        }
+        if (fine == 0) {
+            (void)fprintf(stderr,
+                          "%s: line %d is not demand_w,speed_mps,soc,t_cl_degc, or beyond %d s\n",
+                          name, (int)steps + 2, LONGEST_S);
+            steps = -1;
+        }
+        (void)fclose(file);
+    }
+    return steps;
+}
+
+static void measure(int32_t step, mpc_in *in)
+{
+    in->soc = soc[step];
+    in->t_cl_degc = t_cl_degc[step];
+    in->demand_w = demand_w[step];
+    in->speed_mps = speed_mps[step];
+}
+
+static void drive(int32_t steps)
+{
+    mpc_in in;
+    mpc_out out;
+    mpc_init(&state);
+    (void)mpc_in_from_forecast(&forecast, 0, &in);
+    measure(0, &in);
+    while (mpc_depart(&state, &in) > 0) {
+        /* one slice takes no longer than a step */
+    }
+    (void)printf("time_s,engine_on,p_eng_w,rung,flags\n");
+    for (int32_t step = 0; step < steps; step++) {
+        (void)mpc_in_from_forecast(&forecast, step, &in);
+        measure(step, &in);
+        (void)mpc_step(&state, &in, &out);
+        (void)printf("%d,%d,%.3f,%d,%d\n", (int)step, (int)out.engine_on, (double)out.p_eng_w,
+                     (int)out.rung, (int)out.flags);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    const int32_t steps = (argc > 1) ? read_trip(argv[1]) : built_in_trip();
+    int result = 1;
+    if (steps >= 0) {
+        const mpc_road trip = {demand_w, speed_mps, steps};
+        if (mpc_forecast_start(&forecast, &trip) == 0) {
+            drive(steps);
+            result = 0;
+        } else {
+            (void)fprintf(stderr, "the trip is empty or has a value out of range\n");
+        }
+    }
+    return result;
+}

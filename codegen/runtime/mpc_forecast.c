@@ -1,0 +1,168 @@
+/* From a forecast of the trip to the statistics of its blocks: running sums, apart for each block and
+ * demand class, of all that lies beyond the short horizon.
+ *
+ * A start adds up the whole trip; each second then takes away the one that the short horizon has
+ * reached. What rounding loses is carried along (Knuth's TwoSum), so that a sum of thousands of
+ * seconds that shrinks to a single one keeps the digits of that one. A compiler that is allowed to
+ * reorder sums (-ffast-math) would undo this.
+ */
+#include "mpc_forecast.h"
+#include "mpc_battery_side.h"
+#include "mpc_model.h"
+#include "mpc_parts.h"
+#include "mpc_real.h"
+
+static void add_to(mpc_sum *to, real_t value)
+{
+    const real_t total = to->sum + value;
+    const real_t added = total - to->sum;
+    to->lost += (to->sum - (total - added)) + (value - added);
+    to->sum = total;
+}
+
+static real_t mean_of(const mpc_sum *of, real_t seconds) { return (of->sum + of->lost) / seconds; }
+
+/* Hard driving, easy driving, braking; all the same where there is one class. */
+static int32_t class_of(real_t demand_w)
+{
+#if MPC_CLASSES > 1
+    const int32_t easy_or_braking = (demand_w < mpc_par.class_braking_w) ? 2 : 1;
+    return (demand_w > mpc_par.class_hard_w) ? 0 : easy_or_braking;
+#else
+    (void)demand_w;
+    return 0;
+#endif
+}
+
+/* Add one second of the trip to its block and class, or take it away: times 1 or -1. */
+static void count(mpc_forecast *forecast, int32_t second, int32_t times)
+{
+    const real_t demand_w = forecast->trip.demand_w[second];
+    const real_t net_w = battery_side_w(demand_w);
+    const int32_t block = second / forecast->block_s;
+    mpc_class_sums *const to = &forecast->ahead[(block * MPC_CLASSES) + class_of(demand_w)];
+    const real_t sign = (real_t)times;
+    to->seconds += times;
+    add_to(&to->net_w, sign * net_w);
+    add_to(&to->speed_mps, sign * forecast->trip.speed_mps[second]);
+    add_to(&to->internal_off_w, sign * map_planned_internal_w(net_w));
+}
+
+static void sum_up(mpc_forecast *forecast)
+{
+    static const mpc_class_sums none = {
+        0, {REAL(0.0), REAL(0.0)}, {REAL(0.0), REAL(0.0)}, {REAL(0.0), REAL(0.0)}};
+    for (int32_t k = 0; k < MPC_LONG; k++) {
+        forecast->ahead[k] = none;
+    }
+    for (int32_t second = 0; second < forecast->covered; second++) {
+        count(forecast, second, 1);
+    }
+    forecast->next = 0;
+}
+
+static int32_t is_believable(const mpc_road *trip)
+{
+    int32_t fine = ((trip->steps >= 1) && (trip->steps <= MPC_LONGEST_TRIP_S)) ? 1 : 0;
+    const int32_t steps = (fine != 0) ? trip->steps : 0;
+    for (int32_t k = 0; k < steps; k++) {
+        fine &= check_second(trip->demand_w[k], trip->speed_mps[k]);
+    }
+    return fine;
+}
+
+int32_t mpc_forecast_start(mpc_forecast *forecast, const mpc_road *trip)
+{
+    const int32_t fine = is_believable(trip);
+    forecast->trip = *trip;
+    if (fine == 0) {
+        forecast->trip.steps = 0;
+    }
+    const int32_t steps = forecast->trip.steps;
+#if MPC_BLOCK_S > 0
+    const int32_t block_s = MPC_BLOCK_S;
+#else
+    const int32_t block_s = (steps + (MPC_BLOCKS - 1)) / MPC_BLOCKS;
+#endif
+    const int32_t held = block_s * MPC_BLOCKS;
+    forecast->block_s = block_s;
+    forecast->covered = (steps < held) ? steps : held;
+    sum_up(forecast);
+    return (fine != 0) ? 0 : -1;
+}
+
+/* Leave in the sums what lies from the second `from` on. */
+static void leave_from(mpc_forecast *forecast, int32_t from)
+{
+    if (from < forecast->next) {
+        sum_up(forecast); /* the caller's time has gone back */
+    }
+    while ((forecast->next < from) && (forecast->next < forecast->covered)) {
+        count(forecast, forecast->next, -1);
+        forecast->next++;
+    }
+}
+
+static void fill_short(const mpc_road *seen, mpc_in *in)
+{
+    for (int32_t k = 0; k < MPC_SHORT; k++) {
+        const int32_t ahead = (k < in->short_count) ? 1 : 0;
+        in->short_demand_w[k] = (ahead != 0) ? seen->demand_w[k] : REAL(0.0);
+        in->short_speed_mps[k] = (ahead != 0) ? seen->speed_mps[k] : REAL(0.0);
+    }
+}
+
+static void fill_long(const mpc_forecast *forecast, int32_t is_arriving, mpc_in *in)
+{
+    for (int32_t k = 0; k < MPC_LONG; k++) {
+        const mpc_class_sums *const of = &forecast->ahead[k];
+        const int32_t is_masked = ((is_arriving != 0) || (of->seconds == 0)) ? 1 : 0;
+        const real_t seconds = (is_masked != 0) ? REAL(1.0) : (real_t)of->seconds;
+        const real_t share = (is_masked != 0) ? REAL(0.0) : REAL(1.0);
+        in->long_duration_s[k] = share * seconds;
+        in->long_net_w[k] = share * mean_of(&of->net_w, seconds);
+        in->long_speed_mps[k] = share * mean_of(&of->speed_mps, seconds);
+        /* with one class the preview is averaged: it has no more than the mean demand */
+#if MPC_CLASSES > 1
+        in->long_internal_off_w[k] = share * mean_of(&of->internal_off_w, seconds);
+#else
+        in->long_internal_off_w[k] = map_planned_internal_w(in->long_net_w[k]);
+#endif
+    }
+}
+
+static int32_t fill(mpc_forecast *forecast, int32_t step, const mpc_road *seen, mpc_in *in)
+{
+    const int32_t is_under_way = ((step >= 0) && (seen->steps > 0)) ? 1 : 0;
+    const int32_t ahead = (is_under_way != 0) ? seen->steps : 0;
+    const int32_t is_arriving = (ahead <= MPC_SHORT) ? 1 : 0;
+    in->short_count = (is_arriving != 0) ? ahead : MPC_SHORT;
+    if (is_arriving == 0) {
+        const int32_t now = (step < MPC_LONGEST_TRIP_S) ? step : MPC_LONGEST_TRIP_S;
+        leave_from(forecast, now + MPC_SHORT);
+    }
+    fill_short(seen, in);
+    fill_long(forecast, is_arriving, in);
+    return (is_under_way != 0) ? 0 : -1;
+}
+
+int32_t mpc_in_from_forecast(mpc_forecast *forecast, int32_t step, mpc_in *in)
+{
+    const mpc_road *const trip = &forecast->trip;
+    const int32_t is_under_way = ((step >= 0) && (step < trip->steps)) ? 1 : 0;
+    const int32_t from = (is_under_way != 0) ? step : 0;
+    mpc_road seen = *trip;
+    seen.steps = (is_under_way != 0) ? (trip->steps - from) : 0;
+    if (is_under_way != 0) {
+        seen.demand_w = &trip->demand_w[from];
+        seen.speed_mps = &trip->speed_mps[from];
+    }
+    return fill(forecast, step, &seen, in);
+}
+
+int32_t mpc_in_from_preview(mpc_forecast *forecast, int32_t step, const mpc_road *seen, mpc_in *in)
+{
+    return fill(forecast, step, seen, in);
+}
+
+int32_t mpc_forecast_bytes(void) { return (int32_t)sizeof(mpc_forecast); }

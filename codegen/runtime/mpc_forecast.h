@@ -1,0 +1,89 @@
+/* The long horizon's statistics from a forecast of the trip: public interface, beside mpc.h.
+ *
+ *     before the trip: mpc_forecast_start(&forecast, &trip);
+ *     every second:    mpc_in_from_forecast(&forecast, step, &in);
+ *                      fill in soc, t_cl_degc, demand_w, speed_mps; mpc_step(&state, &in, &out)
+ *
+ * `step` counts the seconds since departure. The trip's arrays belong to the caller, may lie in
+ * flash and must stay as they are until arrival. A start, and nothing else, reads the whole trip;
+ * after it each second costs the same few instructions, however long the trip is.
+ */
+#ifndef MPC_FORECAST_H
+#define MPC_FORECAST_H
+
+#include <stdint.h>
+
+#include "mpc.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define MPC_LONGEST_TRIP_S 100000
+
+/* A road ahead, second by second. */
+typedef struct {
+    const real_t *demand_w;  /* power demand of each second, negative when braking */
+    const real_t *speed_mps; /* mean speed of each second */
+    int32_t steps;           /* seconds to arrival */
+} mpc_road;
+
+/* A sum and what its rounding has lost: twice the digits of one number. */
+typedef struct {
+    real_t sum;
+    real_t lost;
+} mpc_sum;
+
+/* What is ahead of one demand class of one block. */
+typedef struct {
+    int32_t seconds;
+    mpc_sum net_w;
+    mpc_sum speed_mps;
+    mpc_sum internal_off_w;
+} mpc_class_sums;
+
+/* Memory of one forecast. Its contents are private; only its size concerns the caller. */
+typedef struct {
+    mpc_road trip;
+    int32_t block_s;
+    int32_t covered; /* seconds of the trip that the blocks hold */
+    int32_t next;    /* first second that is still in the sums */
+    mpc_class_sums ahead[MPC_LONG];
+} mpc_forecast;
+
+/* Take a forecast of the whole trip, from departure to arrival; its length sets the blocks.
+ *
+ * Returns 0, or -1 if the trip has no second or more than MPC_LONGEST_TRIP_S, or a value that
+ * mpc_step would refuse. Then the long horizon stays empty. It may be called again on the road, with
+ * another forecast of the whole trip; what it says of the past does not count.
+ */
+int32_t mpc_forecast_start(mpc_forecast *forecast, const mpc_road *trip);
+
+/* Fill in the preview of the second `step`, the forecast serving as the short preview too.
+ *
+ * Returns 0, or -1 where there is nothing ahead: short_count is then 0, and mpc_step says
+ * MPC_BAD_PREVIEW.
+ */
+int32_t mpc_in_from_forecast(mpc_forecast *forecast, int32_t step, mpc_in *in);
+
+/* The same with a better short preview: `seen`, whose first second is the coming one. Of its arrays
+ * no more than MPC_SHORT values are read. seen->steps above MPC_SHORT says that arrival is out of
+ * sight; up to MPC_SHORT, that the trip ends there, whatever the forecast still holds.
+ */
+int32_t mpc_in_from_preview(mpc_forecast *forecast, int32_t step, const mpc_road *seen, mpc_in *in);
+
+/* Power demand at the car's battery and engine, from speed, acceleration and grade (rise over run):
+ *
+ *     F = A + B v + C v^2 + m (k a + g grade / sqrt(1 + grade^2)),  A only while rolling
+ *     P = F v / eta_drive when driving, F v eta_regen when braking
+ *
+ * Of a second the mean speed counts and the difference of the speeds at its ends. */
+real_t mpc_demand_w(real_t speed_mps, real_t accel_mps2, real_t grade);
+
+/* sizeof(mpc_forecast), for a caller in another language. */
+int32_t mpc_forecast_bytes(void);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
