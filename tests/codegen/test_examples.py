@@ -14,7 +14,7 @@ from qpmpc.codegen.values import values_of
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import load_cycle
 from qpmpc.preview import Trace
-from qpmpc.simulate import simulate
+from qpmpc.simulation import simulate
 from qpmpc.vehicle import load_vehicle
 
 CAR = load_vehicle()
@@ -79,7 +79,7 @@ def test_a_recorded_trip_gets_the_commands_of_the_python_controller(host) -> Non
     precision, folder = host
     cycle = load_cycle("nycc")
     trace = Trace.of(cycle, CAR)
-    in_python = SETTINGS.with_settings({"mh_qp.solver": "osqp"})
+    in_python = SETTINGS.with_settings({"mh_qp.implementation": "python"})
     drove = simulate(cycle, "mh-qp", CAR, settings=in_python).trajectory
     rows = [trace.demand_w, trace.speed_mps, drove.soc[:-1], drove.t_cl_degc[:-1]]
     lines = [",".join(repr(float(x)) for x in row) for row in zip(*rows, strict=True)]

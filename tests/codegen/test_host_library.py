@@ -150,7 +150,7 @@ class Raw:
 
     def step(self, k: int, **spoilt: object):
         """Run step k with some inputs replaced: a value, or (index, value) of an array."""
-        self.controller._inputs.fill(self.trip.observation(k, self.state), self.controller._in)
+        self.controller.inputs.fill(self.trip.observation(k, self.state), self.controller._in)
         for name, value in spoilt.items():
             if isinstance(value, tuple):
                 getattr(self.controller._in, name)[value[0]] = value[1]
@@ -212,7 +212,7 @@ def test_departure_refuses_bad_input_and_does_nothing_under_way() -> None:
     raw = Raw()
     controller, library = raw.controller, raw.library
     library.init(controller._state)
-    raw.controller._inputs.fill(raw.trip.start, controller._in)
+    raw.controller.inputs.fill(raw.trip.start, controller._in)
     controller._in.long_net_w[0] = math.nan
     assert library.depart(controller._state, ctypes.byref(controller._in)) == -1
     raw.step(0)
@@ -224,7 +224,7 @@ def test_departure_cut_short_is_a_warm_start() -> None:
     raw = Raw()
     controller, library = raw.controller, raw.library
     library.init(controller._state)
-    raw.controller._inputs.fill(raw.trip.start, controller._in)
+    raw.controller.inputs.fill(raw.trip.start, controller._in)
     for _ in range(7):
         assert library.depart(controller._state, ctypes.byref(controller._in)) == 1
     outs = [raw.step(k) for k in range(6)]
@@ -276,7 +276,7 @@ SPOILT = 10
 def flags_after_a_spoilt_preview() -> list[int]:
     """Flags of the steps from the spoilt one on; every decision equals Python's."""
     trip, ours, reference = pair("nycc")
-    ours._inputs._preview = SpoiltPreview(ours._inputs._preview, SPOILT)
+    ours.inputs._preview = SpoiltPreview(ours.inputs._preview, SPOILT)
     reference.planner.preview = SpoiltPreview(reference.planner.preview, SPOILT)
     flags = []
     for mine, its in compare(trip, ours, reference, SPOILT + 12):

@@ -369,7 +369,7 @@ def test_a_departure_taken_over_by_another_controller_ends_and_the_rules_drive(f
     library = library_of(files)
     first = controller(library, prepared=False)
     at = (CAR.trip.soc_init, CAR.trip.t_cl_init_degc, False)
-    first._inputs.fill(Observation(0, *at, 0.0, 0.0), first._in)
+    first.inputs.fill(Observation(0, *at, 0.0, 0.0), first._in)
     for _ in range(3):
         assert library.depart(first._state, ctypes.byref(first._in)) == 1
     controller(library, prepared=False)

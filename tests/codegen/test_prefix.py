@@ -18,7 +18,7 @@ from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import load_cycle
 from qpmpc.errors import InputError
 from qpmpc.preview import StageBuilder, Trace
-from qpmpc.simulate import simulate
+from qpmpc.simulation import simulate
 from qpmpc.trip import Observation
 from qpmpc.vehicle import load_vehicle
 

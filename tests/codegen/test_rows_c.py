@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qpmpc.codegen import values_of
+from qpmpc.codegen.values import values_of
 from qpmpc.codegen.c_text import Writer
 from qpmpc.codegen.elimination import Elimination
 from qpmpc.codegen.generate import project_files

@@ -47,7 +47,7 @@ class GeneratedQp:
         self.library = HostLibrary(file, values, "f64")
         self._reader = ctypes.CDLL(str(file))
         self._reader.reader_prepare.restype = ctypes.c_double
-        self._inputs = inputs
+        self.inputs = inputs
         self._state = ctypes.create_string_buffer(self.library.state_bytes)
         self._in = self.library.input_type()
         self._columns = values.sizes.stages, VARS
@@ -65,7 +65,7 @@ class GeneratedQp:
         -------
         cost and rows, in grams and SI units
         """
-        self._inputs.fill(seen, self._in)
+        self.inputs.fill(seen, self._in)
         plan = np.array(x, dtype=float)
         cost = self._reader.reader_prepare(self._state, ctypes.byref(self._in), _pointer(plan))
         stages, rows = self._rows
