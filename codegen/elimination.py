@@ -10,13 +10,6 @@ from itertools import combinations_with_replacement, permutations
 from qpmpc.codegen.rows_c import function, indented, is_unit, member, of_pieces, variable
 from qpmpc.qp.rows import ROWS, Entry, Row, Var, states
 
-STATES = states()
-
-
-def local(var: Var) -> str:
-    """Return the name of a variable in C."""
-    return var.name.lower()
-
 
 def weight(row: Row) -> str:
     """Return rho of a row in C."""
@@ -24,69 +17,86 @@ def weight(row: Row) -> str:
 
 
 class Elimination:
-    """Columns of the factor L D L' of a stage.
+    """The factor L D L' of a stage, column by column.
 
-    First those of the states before, then the stage's own variables: next whatever leaves the
-    fewest entries, the states last, because the next stage needs them.
+    First the states of the stage before, whose elimination that stage has prepared, then the
+    stage's own variables: next whatever leaves the fewest entries, the states last, because the
+    stage after needs them.
 
     Attributes
     ----------
-    order : variables of a stage, as they are eliminated
-    before : by state before, the variables of the stage in its column
-    own : by variable, those eliminated later in its column
+    columns : by pivot, what stands below it, in the order of elimination
     """
 
     def __init__(self) -> None:
-        edges: dict[Var, set[Var]] = {var: set() for var in Var}
+        edges: dict[Entry, set[Entry]] = {Entry(var, False): set() for var in reversed(Var)}
+        before = [Entry(state, True) for state in states()]
+        ends = [Entry(state, False) for state in states()]
+        edges |= {entry: set() for entry in before}
 
-        def connect(members: Iterable[Var]) -> None:
+        def connect(members: Iterable[Entry]) -> None:
             for one, other in permutations(members, 2):
                 edges[one].add(other)
 
-        here = {row.name: [entry.var for entry in row.terms if not entry.before] for row in ROWS}
-        for members in here.values():
-            connect(members)
-        connect(STATES)  # by rows of the stage after, or by elimination
-        self.before: dict[Var, list[Var]] = {}
-        column: set[Var] = set()
-        for state in STATES:  # a later state's column takes over what an earlier one's has
-            column |= {v for row in ROWS if Entry(state, True) in row.terms for v in here[row.name]}
-            self.before[state] = list(column)
-            connect(column)
-        self.order: list[Var] = []
-        self.own: dict[Var, list[Var]] = {}
+        for row in ROWS:
+            connect(row.terms)
+        connect(before)  # by the elimination of the stage before
+        connect(ends)  # by rows of the stage after
+        found: dict[Entry, list[Entry]] = {}
         while edges:
-            inner = [var for var in reversed(Var) if var in edges and var not in STATES]
-            last = [var for var in STATES if var in edges]
-            pivot = min(inner, key=lambda var: len(edges[var])) if inner else last[0]
-            self.order.append(pivot)
-            self.own[pivot] = list(edges.pop(pivot))
-            for var in self.own[pivot]:
-                edges[var].discard(pivot)
-            connect(self.own[pivot])
-        for found in (*self.before.values(), *self.own.values()):
-            found.sort(key=self.order.index)
+            first = [entry for entry in before if entry in edges]
+            inner = [entry for entry in edges if entry not in ends]
+            last = [entry for entry in ends if entry in edges]
+            pivot = [*first, *sorted(inner, key=lambda entry: len(edges[entry])), *last][0]
+            found[pivot] = list(edges.pop(pivot))
+            connect(found[pivot])
+            for entry in found[pivot]:
+                edges[entry].discard(pivot)
+        self._rank = {entry: i for i, entry in enumerate(found)}
+        self.columns = {
+            p: sorted(column, key=self._rank.__getitem__) for p, column in found.items()
+        }
 
-    def pair(self, one: Var, other: Var) -> tuple[Var, Var]:
+    def pair(self, one: Entry, other: Entry) -> tuple[Entry, Entry]:
         """Return a pair with the one that is eliminated later first."""
-        return (one, other) if self.order.index(one) >= self.order.index(other) else (other, one)
+        return (one, other) if self._rank[one] >= self._rank[other] else (other, one)
 
-    def normal(self, one: Var, other: Var) -> str:
+    def normal(self, one: Entry, other: Entry) -> str:
         """Return the name of an entry of the normal matrix."""
-        later, earlier = self.pair(one, other)
-        return f"m_{local(later)}_{local(earlier)}"
+        return "m_{}_{}".format(*(entry.name for entry in self.pair(one, other)))
 
-    def pairs(self) -> list[tuple[Var, Var]]:
-        """Entries of the normal matrix, fill-in too."""
-        columns = [*self.before.values(), *([p, *column] for p, column in self.own.items())]
-        both = [self.pair(a, b) for c in columns for a, b in combinations_with_replacement(c, 2)]
-        return list(dict.fromkeys(both))
+    def pairs(self) -> list[tuple[Entry, Entry]]:
+        """Entries of the normal matrix, fill-in too; those between states before are not needed."""
+        return list(
+            dict.fromkeys(
+                self.pair(one, other)
+                for pivot, column in self.columns.items()
+                for one, other in combinations_with_replacement([pivot, *column], 2)
+                if not (one.before and other.before)
+            )
+        )
+
+    def factors(self, before: bool) -> Iterator[tuple[Entry, Entry]]:
+        """Entries of L that belong to a stage as (row, column), of columns before or its own."""
+        for pivot, column in self.columns.items():
+            if pivot.before is before:
+                yield from ((entry, pivot) for entry in column if not entry.before)
+
+    def own(self) -> list[Entry]:
+        """Variables of the stage, as they are eliminated."""
+        return [entry for entry in self.columns if not entry.before]
+
+
+def factor_of(row: Entry, column: Entry) -> str:
+    """Return an entry of L in C; between states before it is the stage before's."""
+    if row.before:
+        return f"g->{Entry(row.var, False).name}_{Entry(column.var, False).name}"
+    return f"f->{row.name}_{column.name}"
 
 
 def factor_type(e: Elimination) -> str:
     """Return the type of a stage's factor."""
-    names = [f"{local(v)}_{local(s)}_before" for s, column in e.before.items() for v in column]
-    names += [f"{local(v)}_{local(p)}" for p, column in e.own.items() for v in column]
+    names = [factor_of(*pair)[3:] for before in (True, False) for pair in e.factors(before)]
     lines = [f"real_t {name};" for name in (*names, "inverse_d[MPC_VARS]")]
     return (
         "/* L D L' of a stage: what of L can differ from 0, as row_column; the columns of the\n"
@@ -102,19 +112,15 @@ def factorise(e: Elimination) -> str:
     lines += _assemble(e)
     lines += ["if (after != NULL) {", "    const stage_matrix *const next = &after->a;"]
     for row in ROWS:
-        for one, other in _pairs(row, before=True):
+        known = [entry for entry in row.terms if entry.before]
+        for one, other in combinations_with_replacement(known, 2):
+            name = e.normal(Entry(one.var, False), Entry(other.var, False))
             values = f"{member(row, one, 'next')} * {member(row, other, 'next')}"
-            lines.append(f"    {e.normal(one.var, other.var)} += {weight(row)} * {values};")
+            lines.append(f"    {name} += {weight(row)} * {values};")
     lines += ["}", "if (before != NULL) {", "    const stage_factor *const g = &before->factor;"]
-    lines += [f"    {line}" for line in _eliminate_before(e)]
-    lines.append("}")
-    for pivot, column in e.own.items():
-        inverse = f"f->inverse_d[{variable(pivot)}]"
-        lines.append(f"{inverse} = REAL(1.0) / {e.normal(pivot, pivot)};")
-        factor = {var: f"f->{local(var)}_{local(pivot)}" for var in column}
-        lines += [f"{factor[var]} = {e.normal(var, pivot)} * {inverse};" for var in column]
-        for low, high in combinations_with_replacement(column, 2):
-            lines.append(f"{e.normal(low, high)} -= {factor[high]} * {e.normal(low, pivot)};")
+    pivots = {pivot: _eliminate(e, pivot, column) for pivot, column in e.columns.items()}
+    lines += [f"    {line}" for pivot, part in pivots.items() if pivot.before for line in part]
+    lines += ["}", *(line for pivot, part in pivots.items() if not pivot.before for line in part)]
     return function(
         "void rows_factorise(mpc_stage *stage, const mpc_stage *before, const mpc_stage *after)",
         "P + s I + A'RA of a stage, factorised once the stage before is.",
@@ -122,97 +128,83 @@ def factorise(e: Elimination) -> str:
     )
 
 
-def _pairs(row: Row, before: bool) -> Iterator[tuple[Entry, Entry]]:
-    entries = [entry for entry in row.terms if entry.before is before]
-    yield from combinations_with_replacement(entries, 2)
-
-
 def _assemble(e: Elimination) -> list[str]:
     """Inequalities first, to be weighted all at once; then Hessian and equalities."""
-    lines, touched = [], set()
+    inequalities: list[str] = []
+    equalities: list[str] = []
+    touched = set()
     for row in ROWS:
-        if not row.is_equality:
-            products = []
-            for one, other in _pairs(row, before=False):
-                touched.add(e.pair(one.var, other.var))
+        products = []
+        for one, other in combinations_with_replacement(row.terms, 2):
+            if not (one.before and other.before):
                 value = f"{member(row, one)} * {member(row, other)}"
                 value = "REAL(1.0)" if is_unit(row) else value
-                products.append(f"{e.normal(one.var, other.var)} += {value};")
-            lines += of_pieces(row, products)
+                value = f"{weight(row)} * {value}" if row.is_equality else value
+                products.append(f"{e.normal(one, other)} += {value};")
+                if not row.is_equality:
+                    touched.add(e.pair(one, other))
+        (equalities if row.is_equality else inequalities).extend(of_pieces(row, products))
+    weighted = []
     for later, earlier in e.pairs():
         name = e.normal(later, earlier)
-        if later is earlier:
-            small = f"stage->hessian[{variable(later)}] + mpc_par.proximal"
-            lines.append(f"{name} = {small} + (mpc_par.rho * {name});")
+        if later == earlier:
+            small = f"stage->hessian[{variable(later.var)}] + mpc_par.proximal"
+            weighted.append(f"{name} = {small} + (mpc_par.rho * {name});")
         elif (later, earlier) in touched:
-            lines.append(f"{name} *= mpc_par.rho;")
-    for row in ROWS:
-        if row.is_equality:
-            for one, other in _pairs(row, before=False):
-                values = f"{member(row, one)} * {member(row, other)}"
-                lines.append(f"{e.normal(one.var, other.var)} += {weight(row)} * {values};")
-    return lines
+            weighted.append(f"{name} *= mpc_par.rho;")
+    return inequalities + weighted + equalities
 
 
-def _eliminate_before(e: Elimination) -> list[str]:
-    """Columns c of the states before in A'RA, and what their elimination leaves."""
-    lines = []
-    for state, column in e.before.items():
-        known = [row for row in ROWS if Entry(state, True) in row.terms]
-        for var in column:
-            terms = [
-                f"({weight(row)} * {member(row, Entry(state, True))} * {member(row, entry)})"
-                for row in known
-                if (entry := Entry(var, False)) in row.terms
-            ]
-            start = " + ".join(terms) or "REAL(0.0)"
-            lines.append(f"real_t c_{local(var)}_{local(state)} = {start};")
-    for state, column in e.before.items():
-        c = {var: f"c_{local(var)}_{local(state)}" for var in column}
-        factor = {var: f"f->{local(var)}_{local(state)}_before" for var in column}
-        lines += [f"{factor[var]} = {c[var]} * g->inverse_d[{variable(state)}];" for var in column]
-        for one, other in combinations_with_replacement(column, 2):
-            lines.append(f"{e.normal(one, other)} -= {factor[other]} * {c[one]};")
-        for later in e.own[state]:
-            held = f"g->{local(later)}_{local(state)}"
-            lines += [f"c_{local(var)}_{local(later)} -= {c[var]} * {held};" for var in column]
+def _eliminate(e: Elimination, pivot: Entry, column: list[Entry]) -> list[str]:
+    place = f"inverse_d[{variable(pivot.var)}]"
+    inverse = f"g->{place}" if pivot.before else f"f->{place}"
+    lines = [] if pivot.before else [f"{inverse} = REAL(1.0) / {e.normal(pivot, pivot)};"]
+    for entry in column:
+        if not entry.before:
+            lines.append(f"{factor_of(entry, pivot)} = {e.normal(entry, pivot)} * {inverse};")
+    for low, high in combinations_with_replacement(column, 2):
+        if low.before and not high.before:  # what the pivot held of it was eliminated before
+            value = f"{factor_of(low, pivot)} * {e.normal(high, pivot)}"
+            lines.append(f"{e.normal(high, low)} -= {value};")
+        elif not low.before:
+            value = f"{factor_of(high, pivot)} * {e.normal(low, pivot)}"
+            lines.append(f"{e.normal(high, low)} -= {value};")
     return lines
 
 
 def substitute(e: Elimination) -> str:
     """Return the two halves of a solution with the factor."""
     start = ["const stage_factor *const f = &stage->factor;", "real_t *const work = stage->work;"]
-    load = [f"real_t {local(var)} = work[{variable(var)}];" for var in e.order]
-    store = [f"work[{variable(var)}] = {local(var)};" for var in e.order]
-    coupled = [(state, var) for state, column in e.before.items() for var in column]
-    inside = [(pivot, var) for pivot, column in e.own.items() for var in column]
+    load = [f"real_t {entry.name} = work[{variable(entry.var)}]" for entry in e.own()]
+    inverse = [f"f->inverse_d[{variable(entry.var)}]" for entry in e.own()]
+    store = [f"work[{variable(entry.var)}] = {entry.name};" for entry in e.own()]
     forward = [
         *start,
-        *load,
+        *(f"{line};" for line in load),
         "if (before != NULL) {",
         *(
-            f"    {local(v)} -= f->{local(v)}_{local(s)}_before * before->work[{variable(s)}];"
-            for s, v in coupled
+            f"    {row.name} -= {factor_of(row, state)} * before->work[{variable(state.var)}];"
+            for row, state in e.factors(before=True)
         ),
         "}",
-        *(f"{local(v)} -= f->{local(v)}_{local(p)} * {local(p)};" for p, v in inside),
+        *(f"{row.name} -= {factor_of(row, p)} * {p.name};" for row, p in e.factors(before=False)),
         *store,
-    ]
-    scale = [
-        line.replace(";", f" * f->inverse_d[{variable(v)}];")
-        for line, v in zip(load, e.order, strict=True)
     ]
     backward = [
         *start,
-        *scale,
+        *(f"{line} * {scale};" for line, scale in zip(load, inverse, strict=True)),
         "if (after != NULL) {",
-        "    const stage_factor *const g = &after->factor;",
+        "    const stage_factor *const next = &after->factor;",
         *(
-            f"    {local(s)} -= g->{local(v)}_{local(s)}_before * after->work[{variable(v)}];"
-            for s, v in coupled
+            f"    {Entry(state.var, False).name} -= "
+            f"next->{factor_of(row, state)[3:]} * after->work[{variable(row.var)}];"
+            for row, state in e.factors(before=True)
         ),
         "}",
-        *(f"{local(p)} -= f->{local(v)}_{local(p)} * {local(v)};" for p, v in reversed(inside)),
+        *(
+            f"{p.name} -= {factor_of(row, p)} * {row.name};"
+            for row, p in reversed(list(e.factors(before=False)))
+        ),
         *store,
     ]
     return "\n".join(

@@ -6,7 +6,6 @@ from qpmpc.codegen.elimination import (
     Elimination,
     factor_type,
     factorise,
-    local,
     substitute,
     weight,
 )
@@ -96,17 +95,17 @@ def _right_hand_side() -> str:
     lines = [MATRIX]
     for var in Var:
         start = f"(mpc_par.proximal * stage->x[{variable(var)}]) - stage->q[{variable(var)}]"
-        lines.append(f"real_t {local(var)} = {start};")
+        lines.append(f"real_t {var.name.lower()} = {start};")
     for row in ROWS:
         at = place(row)
         name = "w" if row.pieces else f"w_{row.name}"
         weighted = f"({weight(row)} * stage->z[{at}]) - stage->y[{at}]"
         inside = [f"const real_t {name} = {weighted};"]
         for entry in row.terms:
-            sum_ = f"work_before[{variable(entry.var)}]" if entry.before else local(entry.var)
+            sum_ = f"work_before[{variable(entry.var)}]" if entry.before else entry.name
             inside.append(f"{sum_} += {'' if is_unit(row) else f'{member(row, entry)} * '}{name};")
         lines += of_pieces(row, inside)
-    lines += [f"stage->work[{variable(var)}] = {local(var)};" for var in Var]
+    lines += [f"stage->work[{variable(var)}] = {var.name.lower()};" for var in Var]
     return function(
         "void rows_right_hand_side(mpc_stage *stage, real_t *work_before)",
         "work = s x - q + A'(Rz - y); what the rows add to the stage before, too",

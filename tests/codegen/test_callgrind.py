@@ -80,8 +80,9 @@ def counted(
     project = project_files(recorder.controller.library.values, "host", precision)
     with TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        for name in ("mpc.h", "mpc_state.h", "mpc_config.h"):
-            (folder / name).write_text(project[name])
+        for name in project:
+            if name.endswith(".h"):
+                (folder / name).write_text(project[name])
         (folder / "replay.c").write_text(REPLAY_C)
         build = [compiler(), "-std=c99", "-o", "replay", "replay.c", compiled(project)]
         subprocess.run(build, cwd=folder, check=True)

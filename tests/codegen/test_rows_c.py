@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qpmpc.codegen.values import values_of
 from qpmpc.codegen.c_text import Writer
 from qpmpc.codegen.elimination import Elimination
 from qpmpc.codegen.generate import project_files
 from qpmpc.codegen.host_library import compiled, compiler
 from qpmpc.codegen.rows_c import FUNCTIONS, types_h, values_h
+from qpmpc.codegen.values import values_of
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.qp.expressions import FormulaError, code_of, expression
-from qpmpc.qp.rows import ROWS, VARS, Row, Rows, Var
+from qpmpc.qp.rows import ROWS, VARS, Entry, Row, Rows, Var
 from qpmpc.qp.structure import QpStructure
 from qpmpc.vehicle import load_vehicle
 
@@ -94,18 +94,18 @@ def test_the_factor_has_every_entry_that_elimination_makes(seed, stages) -> None
     structure, e = QpStructure(stages, rows), Elimination()
     rng = np.random.default_rng(seed)
     a = structure.matrix_of(structure.data(rng.uniform(0.5, 1.5, (stages, len(structure.index)))))
-    order = np.add.outer(np.arange(stages) * VARS, e.order).ravel()
+    own = [entry.var for entry in e.own()]
+    order = np.add.outer(np.arange(stages) * VARS, own).ravel()
     normal = (a.T @ a).toarray()[np.ix_(order, order)] + np.eye(len(order))
     factor = np.abs(np.linalg.cholesky(normal)) > 1e-9
     expected = np.eye(len(order), dtype=bool)
-    at = {var: i for i, var in enumerate(e.order)}
     for k in range(stages):
-        for pivot, column in e.own.items():
-            expected[[k * VARS + at[v] for v in column], k * VARS + at[pivot]] = True
-        for state, column in e.before.items() if k else ():
-            expected[[k * VARS + at[v] for v in column], (k - 1) * VARS + at[state]] = True
+        for before in (True, False) if k else (False,):
+            for row, column in e.factors(before):
+                i, j = own.index(row.var), own.index(column.var)
+                expected[k * VARS + i, (k - before) * VARS + j] = True
     assert not (factor & ~expected).any()
-    assert expected.sum() - factor.sum() <= len(e.own)  # nothing but fill of the first stage more
+    assert expected.sum() - factor.sum() <= VARS  # nothing but fill of the first stage more
 
 
 def test_a_new_variable_and_row_need_no_edit_of_the_factor(monkeypatch) -> None:
@@ -113,9 +113,10 @@ def test_a_new_variable_and_row_need_no_edit_of_the_factor(monkeypatch) -> None:
     row = Row("extra", "internal + soc_before - 2.0 * t_slack <= 5.0")
     monkeypatch.setattr("qpmpc.codegen.elimination.ROWS", (*ROWS, row))
     e = Elimination()
-    assert Var.INTERNAL in e.own[Var.T_SLACK]
-    assert Var.T_SLACK in e.before[Var.SOC]
-    assert e.order[-2:] == [Var.SOC, Var.T_CL]
+    slack, internal = Entry(Var.T_SLACK, False), Entry(Var.INTERNAL, False)
+    assert e.pair(slack, internal) in {e.pair(*pair) for pair in e.factors(before=False)}
+    assert (slack, Entry(Var.SOC, True)) in e.factors(before=True)
+    assert [entry.var for entry in e.own()][-2:] == [Var.SOC, Var.T_CL]
 
 
 def test_names_and_constructs_that_c_does_not_have_are_refused() -> None:

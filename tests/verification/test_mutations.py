@@ -214,8 +214,8 @@ MUTATIONS = [
     ),
     # other renderings
     Mutation(
-        "cvxpy without the off-part of the perspective", CvxpyTwin, "_battery",
-        "self._off_w - cp.multiply", "0.0 * self._off_w - cp.multiply", RENDERINGS,
+        "cvxpy with all pieces as the first", CvxpyTwin, "_of_piece",
+        "column = piece if", "column = 0 if", RENDERINGS,
         ("Matrices, cvxpy", "Optimum, cvxpy"),
     ),
     Mutation(
