@@ -52,8 +52,8 @@ static mpc_out out;
 static real_t demand_w[TRIP_S];
 static real_t speed_mps[TRIP_S];
 
-/* The last seconds, for the debugger or to be sent out. The inputs of a second, sent as they are,
- * let the host library repeat it. */
+/* The last seconds, for the debugger or to be sent out. With the inputs of all seconds, sent as
+ * they are, the host library drives the trip again. */
 #define LOG_LENGTH 64
 typedef struct {
     uint32_t forecast_cycles;

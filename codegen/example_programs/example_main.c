@@ -4,9 +4,10 @@
  *     ./example                          a built-in trip of a minute
  *     ./example TRIP.csv > commands.csv
  *
- * TRIP.csv has a heading and then one line per second of the trip: demand_w,speed_mps,soc,t_cl_degc.
- * Demand and speed are both the forecast and what comes true. SOC and coolant temperature are those
- * measured at the start of the second; there is no car in this program that would make them.
+ * TRIP.csv has a heading and then one line per second of the trip:
+ * demand_w,speed_mps,soc,t_cl_degc. Demand and speed are both the forecast and what comes true. SOC
+ * and coolant temperature are those measured at the start of the second; there is no car in this
+ * program that would make them.
  */
 #include <stdio.h>
 

@@ -38,7 +38,8 @@ typedef struct {
     /* statistics of what lies beyond, block by block, in each block class by class (hard driving,
      * easy driving, braking): seconds, mean of the net power P0 = demand + auxiliaries (each
      * second clipped at the battery's charge limit before the mean is taken), mean speed, mean of
-     * the internal battery power l(P0) with the engine off. 0 seconds where nothing is left. */
+     * the internal battery power l(P0) with the engine off. 0 seconds where nothing is left.
+     * mpc_forecast.h makes the preview from demand and speed of the trip. */
     real_t long_duration_s[MPC_LONG];
     real_t long_net_w[MPC_LONG];
     real_t long_speed_mps[MPC_LONG];

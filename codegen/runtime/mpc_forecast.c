@@ -1,5 +1,5 @@
-/* From a forecast of the trip to the statistics of its blocks: running sums, apart for each block and
- * demand class, of all that lies beyond the short horizon.
+/* From a forecast of the trip to the statistics of its blocks: running sums, apart for each block
+ * and demand class, of all that lies beyond the short horizon.
  *
  * A start adds up the whole trip; each second then takes away the one that the short horizon has
  * reached. What rounding loses is carried along (Knuth's TwoSum), so that a sum of thousands of

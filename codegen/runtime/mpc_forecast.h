@@ -54,8 +54,8 @@ typedef struct {
 /* Take a forecast of the whole trip, from departure to arrival; its length sets the blocks.
  *
  * Returns 0, or -1 if the trip has no second or more than MPC_LONGEST_TRIP_S, or a value that
- * mpc_step would refuse. Then the long horizon stays empty. It may be called again on the road, with
- * another forecast of the whole trip; what it says of the past does not count.
+ * mpc_step would refuse. Then the long horizon stays empty. It may be called again on the road,
+ * with another forecast of the whole trip; what it says of the past does not count.
  */
 int32_t mpc_forecast_start(mpc_forecast *forecast, const mpc_road *trip);
 
