@@ -53,7 +53,9 @@ class Elimination:
             for entry in found[pivot]:
                 edges[entry].discard(pivot)
         self._rank = {entry: i for i, entry in enumerate(found)}
-        self.columns = {p: sorted(column, key=self._rank.__getitem__) for p, column in found.items()}
+        self.columns = {
+            p: sorted(column, key=self._rank.__getitem__) for p, column in found.items()
+        }
 
     def pair(self, one: Entry, other: Entry) -> tuple[Entry, Entry]:
         """Return a pair with the one that is eliminated later first."""
