@@ -94,9 +94,9 @@ class CvxpyTwin:
         return self._of_piece(code, piece)
 
     def _of_piece(self, code: CodeType, piece: int) -> Floats:
-        found = np.asarray(self._quantities.value(code), dtype=float)
-        column = piece if found.ndim and found.shape[1] > 1 else 0
-        return np.broadcast_to(found[:, column] if found.ndim else found, (self.stages,))
+        found = np.atleast_2d(self._quantities.value(code))
+        column = piece if found.shape[1] > 1 else 0
+        return np.broadcast_to(found[:, column], (self.stages,))
 
     def _constraints(self, row: Row) -> list[Any]:
         """One row of every stage, for each piece of its curve."""
