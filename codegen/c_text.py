@@ -3,7 +3,8 @@
 import ast
 import inspect
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import Any
 
 from qpmpc.qp.expressions import FormulaError, targets_of
 
@@ -18,17 +19,10 @@ class Writer:
     Parameters
     ----------
     names, functions : how variables and functions are written in C
-    structs : functions of several values, and the C type of what they return; its members are
-        called as the names that take them
     """
 
-    def __init__(
-        self,
-        names: dict[str, str],
-        functions: dict[str, str],
-        structs: dict[str, str] | None = None,
-    ) -> None:
-        self.names, self._functions, self._structs = dict(names), functions, structs or {}
+    def __init__(self, names: dict[str, str], functions: dict[str, str]) -> None:
+        self.names, self._functions = dict(names), functions
 
     def expression(self, node: ast.expr) -> str:
         """Write an expression; a product or sum inside another is in parentheses.
@@ -65,43 +59,55 @@ class Writer:
         compound = isinstance(node, ast.BinOp | ast.Compare | ast.UnaryOp)
         return f"({text})" if compound else text
 
-    def lines(self, statements: list[ast.stmt], used: set[str]) -> list[str]:
-        """Write assignments as constants of a function; those that nothing uses are left out."""
+    def lines(self, statements: Iterable[ast.stmt]) -> list[str]:
+        """Write assignments as constants of a function."""
         written: list[str] = []
         for statement in statements:
             targets = targets_of(statement)
-            if not isinstance(statement, ast.Assign) or not used & set(targets):
-                continue
-            value = statement.value
-            match value:
-                case ast.Call(func=ast.Name(id="running"), args=[argument]):
+            match statement:
+                case ast.Assign(value=ast.Call(func=ast.Name(id="running"), args=[argument])):
                     (target,) = targets
                     written += [f"sums->{target} += {self.expression(argument)};"]
                     self.names[target] = f"sums->{target}"
-                    continue
-                case ast.Call(func=ast.Name(id=name)) if name in self._structs:
-                    result = f"of_{name}"
-                    written += [f"const {self._structs[name]} {result} = {self.expression(value)};"]
-                    self.names |= {target: f"{result}.{target}" for target in targets}
-                    continue
-            (target,) = targets
-            written += [f"const real_t {target} = {self.expression(value)};"]
-            self.names[target] = target
+                case ast.Assign(value=ast.Call(func=ast.Name(id=name)) as call) if targets[1:]:
+                    written += [f"const {name}_result of_{name} = {self.expression(call)};"]
+                    self.names |= {target: f"of_{name}.{target}" for target in targets}
+                case ast.Assign(value=value):
+                    (target,) = targets
+                    written += [f"const real_t {target} = {self.expression(value)};"]
+                    self.names[target] = target
         return written
 
-    def function(self, function: Callable[..., float], prefix: str) -> str:
-        """Write a Python function of one expression; its first argument is the parameters."""
+    def function(self, function: Callable[..., Any]) -> str:
+        """Write a Python function: assignments, and one value or a tuple of them returned.
+
+        Its first argument, `th`, is the set of parameters. Several values come as a structure
+        whose members are called as they are in the tuple.
+        """
+        name = function.__name__
         match ast.parse(inspect.getsource(function)).body:
-            case [ast.FunctionDef(args=given, body=[*_, ast.Return(value=ast.expr() as value)])]:
-                _, *names = [argument.arg for argument in given.args]
+            case [
+                ast.FunctionDef(args=given, body=[_, *body, ast.Return(value=ast.expr() as value)])
+            ]:
+                _, *arguments = [argument.arg for argument in given.args]
             case _:
-                raise FormulaError(f"{function.__name__} is not a function of one expression")
-        body = Writer(self.names | {name: name for name in names}, self._functions)
-        signature = ", ".join(f"real_t {name}" for name in names)
-        return (
-            f"static inline real_t {prefix}{function.__name__}({signature})\n"
-            f"{{\n{wrapped(f'return {body.expression(value)};', 4)}\n}}\n"
-        )
+                raise FormulaError(f"{name} does not end with what it returns")
+        inner = Writer(self.names | {argument: argument for argument in arguments}, self._functions)
+        lines, kind, before = inner.lines(body), "real_t", ""
+        if isinstance(value, ast.Tuple):
+            parts = [part.id for part in value.elts if isinstance(part, ast.Name)]
+            kind = f"{name}_result"
+            before = f"typedef struct {{\n{_body(f'real_t {p};' for p in parts)}\n}} {kind};\n\n"
+            lines += [f"const {kind} result = {{{', '.join(parts)}}};", "return result;"]
+        else:
+            lines.append(f"return {inner.expression(value)};")
+        signature = ", ".join(f"real_t {argument}" for argument in arguments) or "void"
+        start = f"{before}static inline {kind} {self._functions[name]}({signature})\n"
+        return f"{start}{{\n{_body(lines)}\n}}\n"
+
+
+def _body(lines: Iterable[str]) -> str:
+    return "\n".join(wrapped(line, 4) for line in lines)
 
 
 def wrapped(line: str, indent: int) -> str:

@@ -19,14 +19,6 @@ real_t pwa_alpha(real_t t_cl_degc);
 real_t pwa_alpha_slope(real_t t_cl_degc);
 real_t pwa_battery(real_t power_w);
 
-/* mpc_thermostat.c */
-typedef struct {
-    real_t over_k; /* K above the thermostat's opening, at the end of a stage */
-    real_t per_heat; /* its derivatives with respect to heat, K/W, and to over_k at the start */
-    real_t per_start;
-} thermostat_end;
-thermostat_end thermostat_step(real_t duration_s, real_t start_k, real_t heat_w);
-
 /* mpc_qp.c: values of the quadratic program */
 void qp_road(mpc_state *state, const mpc_in *in);
 void qp_move_origin(mpc_state *state, real_t soc, real_t t_cl_degc);

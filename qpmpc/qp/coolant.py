@@ -1,6 +1,10 @@
-"""The coolant over a stage in which its thermostat opens or closes: exact, with derivatives."""
+"""The coolant over a stage in which its thermostat opens or closes: exact, with derivatives.
+
+The functions are in the subset of `qpmpc.qp.expressions`: the generated C is made from them.
+"""
 
 import numpy as np
+from numpy import exp, expm1, log, where
 from numpy.typing import NDArray
 
 from qpmpc.vehicle.parameters import Thermal
@@ -8,18 +12,18 @@ from qpmpc.vehicle.parameters import Thermal
 Floats = NDArray[np.float64]
 
 
-def radiator_w_per_k(thermal: Thermal) -> float:
+def radiator_w_per_k(th: Thermal) -> float:
     """Slope of the radiator's heat over its thermostat's span, W/K.
 
     The chord from closed to fully open, UA_rad (T_max - T_amb) / span: within its span the true
     curve, a parabola, lies at most UA_rad span / 4 below.
     """
-    full_w = thermal.radiator_w_per_k * (thermal.t_cl_max_degc - thermal.t_amb_degc)
-    return full_w / thermal.thermostat_span_k
+    full_w = th.radiator_w_per_k * (th.t_cl_max_degc - th.t_amb_degc)
+    return full_w / th.thermostat_span_k
 
 
 def thermostat_step(
-    thermal: Thermal, duration_s: Floats, start_k: Floats, heat_w: Floats
+    th: Thermal, duration_s: Floats, start_k: Floats, heat_w: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Coolant temperature at the end of stages with constant heat, above the thermostat's opening.
 
@@ -33,42 +37,39 @@ def thermostat_step(
 
     Parameters
     ----------
-    thermal : parameters
+    th : parameters
     duration_s, start_k, heat_w : h, u at the start, q without the radiator; of any one shape
 
     Returns
     -------
-    end_k, per_heat_k_per_w, per_start : u at the end and its derivatives with respect to q and to
+    over_k, per_heat, per_start : u at the end and its derivatives with respect to q and to
         u at the start
     """
-    capacity, slope = thermal.heat_capacity_j_per_k, radiator_w_per_k(thermal)
+    capacity = th.heat_capacity_j_per_k
+    slope = radiator_w_per_k(th)
     tau = capacity / slope
     aim = heat_w / slope  # where the exponential leads
     # the line, for as long as the thermostat is closed; then the exponential, from u = 0
     straight = start_k + heat_w * duration_s / capacity
-    opens = (start_k < 0.0) & (straight > 0.0)
-    closed_s = np.where(opens, -start_k * capacity / np.where(opens, heat_w, 1.0), 0.0)
-    decay = np.exp(-(duration_s - closed_s) / tau)
-    settled = -np.expm1(-(duration_s - closed_s) / tau)  # 1 - decay, exact for short stages too
-    after_line = aim * settled
+    opens = where(start_k < 0.0, where(straight > 0.0, 1.0, 0.0), 0.0)
+    closed_s = where(opens > 0.0, -start_k * capacity / where(opens > 0.0, heat_w, 1.0), 0.0)
+    ever = where(start_k < 0.0, opens, 1.0)  # open; C calls no function where it never is
+    open_for = -(duration_s - closed_s) / tau
+    decay = where(ever > 0.0, exp(open_for), 1.0)
+    settled = where(ever > 0.0, -expm1(open_for), 0.0)  # 1 - decay, exact for short stages too
     # the exponential, for as long as it is open; then the line, from u = 0
     curved = aim + (start_k - aim) * decay
-    closes = (start_k >= 0.0) & (curved < 0.0)
-    ratio = np.where(closes, (start_k - aim) / np.where(closes, -aim, 1.0), 1.0)
-    open_s = tau * np.log(ratio)
-    line_s = duration_s - open_s
-    shut = np.where(closes, start_k - aim, 1.0)
+    closes = where(start_k >= 0.0, where(curved < 0.0, 1.0, 0.0), 0.0)
+    shut = where(closes > 0.0, start_k - aim, 1.0)
+    ratio = where(closes > 0.0, shut / where(closes > 0.0, -aim, 1.0), 1.0)
+    line_s = duration_s - where(closes > 0.0, tau * log(ratio), 0.0)
 
-    cases = [opens, closes, start_k >= 0.0]
-    end = np.select(cases, [after_line, heat_w * line_s / capacity, curved], straight)
-    per_start = np.select(cases, [decay, -aim / shut, decay], 1.0)
-    per_heat = np.select(
-        cases,
-        [
-            settled / slope + decay * closed_s / capacity,
-            line_s / capacity + (1.0 + aim / shut) / slope,
-            settled / slope,
-        ],
-        duration_s / capacity,
-    )
-    return end, per_heat, per_start
+    uncrossed = where(start_k >= 0.0, curved, straight)
+    crossed = where(closes > 0.0, heat_w * line_s / capacity, uncrossed)
+    over_k = where(opens > 0.0, aim * settled, crossed)
+    closing = where(closes > 0.0, -aim / shut, where(start_k >= 0.0, decay, 1.0))
+    per_start = where(opens > 0.0, decay, closing)
+    line = where(start_k >= 0.0, settled / slope, duration_s / capacity)
+    bent = where(closes > 0.0, line_s / capacity + (1.0 + aim / shut) / slope, line)
+    per_heat = where(opens > 0.0, settled / slope + decay * closed_s / capacity, bent)
+    return over_k, per_heat, per_start

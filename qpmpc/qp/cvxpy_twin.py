@@ -101,7 +101,7 @@ class CvxpyTwin:
         return self._of_piece(code, piece)
 
     def _of_piece(self, code: CodeType, piece: int) -> Floats:
-        found = np.atleast_2d(np.asarray(self._quantities.value(code), dtype=float))
+        found = np.atleast_2d(self._quantities.value(code))
         column = piece if found.shape[1] > 1 else 0
         return np.broadcast_to(found[:, column], (self.stages,))
 

@@ -58,7 +58,7 @@ class Quantities:
         self._names: dict[str, Any] = {
             **{name: value for name, value in vars(rows).items() if name.isupper()},
             **parameters,
-            **pieces_of(model),
+            **{name: values[None, :] for name, values in pieces_of(model).items()},
             **{f.__name__: partial(losses[f.__name__], thermal) for f in heat.FUNCTIONS},
             **dict.fromkeys(ORIGIN, 0.0),
             "is_last": is_last,

@@ -10,7 +10,6 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
-from qpmpc.qp.coolant import radiator_w_per_k
 from qpmpc.qp.expressions import code_of, expression
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.quantities import Quantities
@@ -76,7 +75,6 @@ def qp_parameters(
         "engine_min_w": engine.power_min_w,
         "lhv_j_per_g": engine.lhv_j_per_g,
         **{name: float(value) for name, value in thermal.model_dump().items()},
-        "thermostat_w_per_k": radiator_w_per_k(thermal),
         "battery_energy_j": model.battery_energy_j,
         "battery_discharge_max_w": battery.power_discharge_max_w,
         "battery_charge_max_w": battery.power_charge_max_w,

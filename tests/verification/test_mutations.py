@@ -196,8 +196,8 @@ MUTATIONS = [
     ),
     Mutation(
         "radiator of a stage as open as at its end", physics_checks, "thermostat_step",
-        "end = np.select(cases, [after_line,",
-        "end = np.select(cases, [straight / (1.0 + duration_s / tau),", (thermostat_exact,),
+        "aim * settled, crossed", "straight / (1.0 + duration_s / tau), crossed",
+        (thermostat_exact,),
     ),
     # scaling and warm start
     Mutation(
