@@ -74,7 +74,7 @@ class Writer:
                     self.names |= {target: f"of_{name}.{target}" for target in targets}
                 case ast.Assign(value=value):
                     (target,) = targets
-                    written += [f"const real_t {target} = {self.expression(value)};"]
+                    written += [f"const mpc_real {target} = {self.expression(value)};"]
                     self.names[target] = target
         return written
 
@@ -93,15 +93,15 @@ class Writer:
             case _:
                 raise FormulaError(f"{name} does not end with what it returns")
         inner = Writer(self.names | {argument: argument for argument in arguments}, self._functions)
-        lines, kind, before = inner.lines(body), "real_t", ""
+        lines, kind, before = inner.lines(body), "mpc_real", ""
         if isinstance(value, ast.Tuple):
             parts = [part.id for part in value.elts if isinstance(part, ast.Name)]
             kind = f"{name}_result"
-            before = f"typedef struct {{\n{_body(f'real_t {p};' for p in parts)}\n}} {kind};\n\n"
+            before = f"typedef struct {{\n{_body(f'mpc_real {p};' for p in parts)}\n}} {kind};\n\n"
             lines += [f"const {kind} result = {{{', '.join(parts)}}};", "return result;"]
         else:
             lines.append(f"return {inner.expression(value)};")
-        signature = ", ".join(f"real_t {argument}" for argument in arguments) or "void"
+        signature = ", ".join(f"mpc_real {argument}" for argument in arguments) or "void"
         start = f"{before}static inline {kind} {self._functions[name]}({signature})\n"
         return f"{start}{{\n{_body(lines)}\n}}\n"
 

@@ -97,27 +97,34 @@ def factor_of(row: Entry, column: Entry) -> str:
 def factor_type(e: Elimination) -> str:
     """Return the type of a stage's factor."""
     names = [factor_of(*pair)[3:] for before in (True, False) for pair in e.factors(before)]
-    lines = [f"real_t {name};" for name in (*names, "inverse_d[MPC_VARS]")]
+    lines = [f"mpc_real {name};" for name in (*names, "inverse_d[MPC_VARS]")]
     return (
         "/* L D L' of a stage: what of L can differ from 0, as row_column; the columns of the\n"
         " * states before too. */\n"
-        f"typedef struct {{\n{indented(lines)}}} stage_factor;\n"
+        f"typedef struct {{\n{indented(lines)}}} mpc_stage_factor;\n"
     )
 
 
 def factorise(e: Elimination) -> str:
     """Return the function that assembles and factorises a stage."""
-    lines = ["const stage_matrix *const a = &stage->a;", "stage_factor *const f = &stage->factor;"]
-    lines += [f"real_t {e.normal(*pair)} = REAL(0.0);" for pair in e.pairs()]
+    lines = [
+        "const mpc_stage_matrix *const a = &stage->a;",
+        "mpc_stage_factor *const f = &stage->factor;",
+    ]
+    lines += [f"mpc_real {e.normal(*pair)} = REAL(0.0);" for pair in e.pairs()]
     lines += _assemble(e)
-    lines += ["if (after != NULL) {", "    const stage_matrix *const next = &after->a;"]
+    lines += ["if (after != NULL) {", "    const mpc_stage_matrix *const next = &after->a;"]
     for row in ROWS:
         known = [entry for entry in row.terms if entry.before]
         for one, other in combinations_with_replacement(known, 2):
             name = e.normal(Entry(one.var, False), Entry(other.var, False))
             values = f"{member(row, one, 'next')} * {member(row, other, 'next')}"
             lines.append(f"    {name} += {weight(row)} * {values};")
-    lines += ["}", "if (before != NULL) {", "    const stage_factor *const g = &before->factor;"]
+    lines += [
+        "}",
+        "if (before != NULL) {",
+        "    const mpc_stage_factor *const g = &before->factor;",
+    ]
     pivots = {pivot: _eliminate(e, pivot, column) for pivot, column in e.columns.items()}
     lines += [f"    {line}" for pivot, part in pivots.items() if pivot.before for line in part]
     lines += ["}", *(line for pivot, part in pivots.items() if not pivot.before for line in part)]
@@ -174,8 +181,11 @@ def _eliminate(e: Elimination, pivot: Entry, column: list[Entry]) -> list[str]:
 
 def substitute(e: Elimination) -> str:
     """Return the two halves of a solution with the factor."""
-    start = ["const stage_factor *const f = &stage->factor;", "real_t *const work = stage->work;"]
-    load = [f"real_t {entry.name} = work[{variable(entry.var)}]" for entry in e.own()]
+    start = [
+        "const mpc_stage_factor *const f = &stage->factor;",
+        "mpc_real *const work = stage->work;",
+    ]
+    load = [f"mpc_real {entry.name} = work[{variable(entry.var)}]" for entry in e.own()]
     inverse = [f"f->inverse_d[{variable(entry.var)}]" for entry in e.own()]
     store = [f"work[{variable(entry.var)}] = {entry.name};" for entry in e.own()]
     forward = [
@@ -194,7 +204,7 @@ def substitute(e: Elimination) -> str:
         *start,
         *(f"{line} * {scale};" for line, scale in zip(load, inverse, strict=True)),
         "if (after != NULL) {",
-        "    const stage_factor *const next = &after->factor;",
+        "    const mpc_stage_factor *const next = &after->factor;",
         *(
             f"    {Entry(state.var, False).name} -= "
             f"next->{factor_of(row, state)[3:]} * after->work[{variable(row.var)}];"

@@ -21,7 +21,7 @@ from qpmpc.qp.rows import VARS
 ABI_VERSION = 2
 _ABI_NAMES = (
     "version",
-    "sizeof real_t",
+    "sizeof mpc_real",
     "sizeof mpc_in",
     "sizeof mpc_out",
     "sizeof mpc_state",

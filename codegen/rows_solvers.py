@@ -25,7 +25,7 @@ from qpmpc.codegen.rows_c import (
 )
 from qpmpc.qp.rows import ROWS, Entry, Var
 
-MATRIX = "const stage_matrix *const a = &stage->a;"
+MATRIX = "const mpc_stage_matrix *const a = &stage->a;"
 
 
 def rows_files(scalars: Iterable[str], solver: str) -> dict[str, str]:
@@ -84,8 +84,8 @@ def _multiply() -> str:
     for row in ROWS:
         lines += of_pieces(row, [f"value[{place(row)}] = {product(row)};"])
     return function(
-        "void rows_multiply(const mpc_stage *stage, const real_t *x, const real_t *before,\n"
-        "                                 real_t *value)",
+        "void rows_multiply(const mpc_stage *stage, const mpc_real *x, const mpc_real *before,\n"
+        "                                 mpc_real *value)",
         "value = Ax",
         lines,
     )
@@ -95,27 +95,27 @@ def _right_hand_side() -> str:
     lines = [MATRIX]
     for var in Var:
         start = f"(mpc_par.proximal * stage->x[{variable(var)}]) - stage->q[{variable(var)}]"
-        lines.append(f"real_t {var.name.lower()} = {start};")
+        lines.append(f"mpc_real {var.name.lower()} = {start};")
     for row in ROWS:
         at = place(row)
         name = "w" if row.pieces else f"w_{row.name}"
         weighted = f"({weight(row)} * stage->z[{at}]) - stage->y[{at}]"
-        inside = [f"const real_t {name} = {weighted};"]
+        inside = [f"const mpc_real {name} = {weighted};"]
         for entry in row.terms:
             sum_ = f"work_before[{variable(entry.var)}]" if entry.before else entry.name
             inside.append(f"{sum_} += {'' if is_unit(row) else f'{member(row, entry)} * '}{name};")
         lines += of_pieces(row, inside)
     lines += [f"stage->work[{variable(var)}] = {var.name.lower()};" for var in Var]
     return function(
-        "void rows_right_hand_side(mpc_stage *stage, real_t *work_before)",
+        "void rows_right_hand_side(mpc_stage *stage, mpc_real *work_before)",
         "work = s x - q + A'(Rz - y); what the rows add to the stage before, too",
         lines,
     )
 
 
 def _update_z_y() -> str:
-    lines = [MATRIX, "const stage_bounds *const b = &stage->b;"]
-    lines.append("const real_t *const x = stage->work;")
+    lines = [MATRIX, "const mpc_stage_bounds *const b = &stage->b;"]
+    lines.append("const mpc_real *const x = stage->work;")
     for row in ROWS:
         low, high = bounds(row)
         at = f"&stage->z[{place(row)}], &stage->y[{place(row)}]"
@@ -129,7 +129,7 @@ def _update_z_y() -> str:
             call = f"update_between({product(row)}, {low}, {high}, {at});"
         lines += of_pieces(row, [call])
     return function(
-        "void rows_update_z_y(mpc_stage *stage, const real_t *before)",
+        "void rows_update_z_y(mpc_stage *stage, const mpc_real *before)",
         "z and y of all rows from t, in `work`; `before` is that of the stage before.",
         lines,
     )
@@ -148,8 +148,8 @@ def _put_columns() -> str:
                 value = member(row, before, "next")
                 lines += ["if (next != NULL) {", f"    values[at] = {value};", "    at++;", "}"]
     return function(
-        "int32_t rows_put_columns(real_t *values, int32_t first, const stage_matrix *a,\n"
-        "                                       const stage_matrix *next)",
+        "int32_t rows_put_columns(mpc_real *values, int32_t first, const mpc_stage_matrix *a,\n"
+        "                                       const mpc_stage_matrix *next)",
         "Entries of a stage's columns, each from the first row down; returns where they end.",
         [*lines, "return at;"],
     )
@@ -163,7 +163,7 @@ def _put_bounds() -> str:
         both.append(f"high[{place(row)}] = {high or 'UNLIMITED'};")
         lines += of_pieces(row, both)
     return function(
-        "void rows_put_bounds(real_t *low, real_t *high, const stage_bounds *b)",
+        "void rows_put_bounds(mpc_real *low, mpc_real *high, const mpc_stage_bounds *b)",
         "Bounds of a stage's rows.",
         lines,
     )

@@ -31,10 +31,10 @@ void fault_handler(void);
 typedef void (*vector)(void);
 
 __attribute__((section(".vectors"), used)) static const vector vectors[16] = {
-    (vector)link_stack_top, reset_handler, fault_handler, fault_handler, fault_handler,
-    fault_handler,          fault_handler, fault_handler, fault_handler, fault_handler,
-    fault_handler,          fault_handler, fault_handler, fault_handler, fault_handler,
-    fault_handler};
+    (vector)link_stack_top, reset_handler, fault_handler, fault_handler,
+    fault_handler,          fault_handler, fault_handler, fault_handler,
+    fault_handler,          fault_handler, fault_handler, fault_handler,
+    fault_handler,          fault_handler, fault_handler, fault_handler};
 
 __attribute__((noreturn)) void fault_handler(void) { board_exit(BOARD_FAULT); }
 

@@ -49,8 +49,8 @@ static mpc_out out;
 
 /* YOURS: the trip, from the navigation system. */
 #define TRIP_S 20
-static real_t demand_w[TRIP_S];
-static real_t speed_mps[TRIP_S];
+static mpc_real demand_w[TRIP_S];
+static mpc_real speed_mps[TRIP_S];
 
 /* The last seconds, for the debugger or to be sent out. With the inputs of all seconds, sent as
  * they are, the host library drives the trip again. */
@@ -117,8 +117,8 @@ static uint32_t stack_used(void)
 /* YOURS: battery and coolant from the car's bus, demand from the pedals, speed from the wheels. */
 static void read_sensors(int32_t step)
 {
-    in.soc = (real_t)0.6;
-    in.t_cl_degc = (real_t)50.0;
+    in.soc = (mpc_real)0.6;
+    in.t_cl_degc = (mpc_real)50.0;
     in.demand_w = demand_w[step];
     in.speed_mps = speed_mps[step];
 }
@@ -130,8 +130,8 @@ static void command_engine(void) {}
 static void plan_trip(void)
 {
     for (int32_t k = 0; k < TRIP_S; k++) {
-        speed_mps[k] = (real_t)k + (real_t)0.5;
-        demand_w[k] = mpc_demand_w(speed_mps[k], (real_t)1.0, (real_t)0.0);
+        speed_mps[k] = (mpc_real)k + (mpc_real)0.5;
+        demand_w[k] = mpc_demand_w(speed_mps[k], (mpc_real)1.0, (mpc_real)0.0);
     }
 }
 

@@ -16,10 +16,10 @@
 #define LONGEST_S 7200
 #define LINE_LENGTH 256
 
-static real_t demand_w[LONGEST_S];
-static real_t speed_mps[LONGEST_S];
-static real_t soc[LONGEST_S];
-static real_t t_cl_degc[LONGEST_S];
+static mpc_real demand_w[LONGEST_S];
+static mpc_real speed_mps[LONGEST_S];
+static mpc_real soc[LONGEST_S];
+static mpc_real t_cl_degc[LONGEST_S];
 
 static mpc_state state;
 static mpc_forecast forecast;
@@ -28,22 +28,22 @@ static mpc_forecast forecast;
 static int32_t built_in_trip(void)
 {
     static const int32_t steps = 60;
-    real_t speed = (real_t)0.0;
+    mpc_real speed = (mpc_real)0.0;
     for (int32_t k = 0; k < steps; k++) {
-        real_t accel = (real_t)0.0;
+        mpc_real accel = (mpc_real)0.0;
         if (k < 15) {
-            accel = (real_t)1.0;
+            accel = (mpc_real)1.0;
         } else if (k >= 50) {
-            accel = (real_t)-1.5;
+            accel = (mpc_real)-1.5;
         } else {
             /* steady */
         }
-        const real_t grade = ((k >= 25) && (k < 40)) ? (real_t)0.03 : (real_t)0.0;
-        const real_t mean = speed + ((real_t)0.5 * accel);
+        const mpc_real grade = ((k >= 25) && (k < 40)) ? (mpc_real)0.03 : (mpc_real)0.0;
+        const mpc_real mean = speed + ((mpc_real)0.5 * accel);
         demand_w[k] = mpc_demand_w(mean, accel, grade);
         speed_mps[k] = mean;
-        soc[k] = (real_t)0.6;
-        t_cl_degc[k] = (real_t)50.0;
+        soc[k] = (mpc_real)0.6;
+        t_cl_degc[k] = (mpc_real)50.0;
         speed += accel;
     }
     return steps;
@@ -66,10 +66,10 @@ static int32_t read_trip(const char *name)
                 sscanf(line, "%lf,%lf,%lf,%lf", &cell[0], &cell[1], &cell[2], &cell[3]);
             fine = ((found == 4) && (steps < LONGEST_S)) ? 1 : 0;
             if (fine != 0) {
-                demand_w[steps] = (real_t)cell[0];
-                speed_mps[steps] = (real_t)cell[1];
-                soc[steps] = (real_t)cell[2];
-                t_cl_degc[steps] = (real_t)cell[3];
+                demand_w[steps] = (mpc_real)cell[0];
+                speed_mps[steps] = (mpc_real)cell[1];
+                soc[steps] = (mpc_real)cell[2];
+                t_cl_degc[steps] = (mpc_real)cell[3];
                 steps++;
             }
         }

@@ -21,14 +21,14 @@ static void check(const mpc_in *in, const mpc_out *out, int32_t flags)
     int fine = 1;
     (void)in;
     fine &= (out->engine_on == 0) || (out->engine_on == 1);
-    fine &= (out->p_eng_w >= (real_t)0) && (out->p_eng_w <= mpc_par.engine_max_w);
-    fine &= (out->engine_on == 1) || !(out->p_eng_w > (real_t)0);
+    fine &= (out->p_eng_w >= (mpc_real)0) && (out->p_eng_w <= mpc_par.engine_max_w);
+    fine &= (out->engine_on == 1) || !(out->p_eng_w > (mpc_real)0);
     fine &= (out->engine_on == 0) || (out->p_eng_w >= mpc_par.engine_min_w);
     fine &= (out->rung >= MPC_OPTIMISED) && (out->rung <= MPC_RULES);
     fine &= (out->flags == flags) && ((flags & ~all) == 0);
     fine &= (out->rung != MPC_OPTIMISED) || (flags == 0);
-    fine &= (out->on_share * (real_t)0 == (real_t)0);          /* neither infinite nor NaN */
-    fine &= (out->relaxation_gap * (real_t)0 == (real_t)0);
+    fine &= (out->on_share * (mpc_real)0 == (mpc_real)0); /* neither infinite nor NaN */
+    fine &= (out->relaxation_gap * (mpc_real)0 == (mpc_real)0);
     if (!fine) {
         abort();
     }
@@ -37,33 +37,34 @@ static void check(const mpc_in *in, const mpc_out *out, int32_t flags)
 static void sensible(mpc_in *in)
 {
     memset(in, 0, sizeof(*in));
-    in->soc = (real_t)0.6;
-    in->t_cl_degc = (real_t)50;
-    in->demand_w = (real_t)5000;
-    in->speed_mps = (real_t)10;
+    in->soc = (mpc_real)0.6;
+    in->t_cl_degc = (mpc_real)50;
+    in->demand_w = (mpc_real)5000;
+    in->speed_mps = (mpc_real)10;
     in->short_count = MPC_SHORT;
     for (int k = 0; k < MPC_SHORT; k++) {
-        in->short_demand_w[k] = (real_t)5000;
-        in->short_speed_mps[k] = (real_t)10;
+        in->short_demand_w[k] = (mpc_real)5000;
+        in->short_speed_mps[k] = (mpc_real)10;
     }
     for (int k = 0; k < MPC_LONG; k++) {
-        in->long_duration_s[k] = (real_t)30;
-        in->long_net_w[k] = (real_t)4000;
-        in->long_speed_mps[k] = (real_t)10;
-        in->long_internal_off_w[k] = (real_t)4100;
+        in->long_duration_s[k] = (mpc_real)30;
+        in->long_net_w[k] = (mpc_real)4000;
+        in->long_speed_mps[k] = (mpc_real)10;
+        in->long_internal_off_w[k] = (mpc_real)4100;
     }
 }
 
 /* One number of the inputs: mostly allowed values, at the edges too. */
 static void set_real(mpc_in *in, size_t at, uint8_t choice)
 {
-    static const real_t values[] = {
-        (real_t)0,     (real_t)1,     (real_t)-1,   (real_t)0.4,   (real_t)0.6,    (real_t)0.8,
-        (real_t)1e-30, (real_t)1e-3,  (real_t)5,    (real_t)30,    (real_t)90,     (real_t)120,
-        (real_t)150,   (real_t)-60,   (real_t)1e3,  (real_t)-3e4,  (real_t)2.7e4,  (real_t)7e4,
-        (real_t)1e5,   (real_t)-1e5,  (real_t)1e6,  (real_t)-1e6,  (real_t)1e9,    (real_t)1e38};
-    const size_t offset = at - (at % sizeof(real_t));
-    const real_t value = values[choice % (sizeof(values) / sizeof(values[0]))];
+    static const mpc_real values[] = {
+        (mpc_real)0,    (mpc_real)1,     (mpc_real)-1,   (mpc_real)0.4, (mpc_real)0.6,
+        (mpc_real)0.8,  (mpc_real)1e-30, (mpc_real)1e-3, (mpc_real)5,   (mpc_real)30,
+        (mpc_real)90,   (mpc_real)120,   (mpc_real)150,  (mpc_real)-60, (mpc_real)1e3,
+        (mpc_real)-3e4, (mpc_real)2.7e4, (mpc_real)7e4,  (mpc_real)1e5, (mpc_real)-1e5,
+        (mpc_real)1e6,  (mpc_real)-1e6,  (mpc_real)1e9,  (mpc_real)1e38};
+    const size_t offset = at - (at % sizeof(mpc_real));
+    const mpc_real value = values[choice % (sizeof(values) / sizeof(values[0]))];
     if (offset < offsetof(mpc_in, short_count)) {
         memcpy((uint8_t *)in + offset, &value, sizeof(value));
     }

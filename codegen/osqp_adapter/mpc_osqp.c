@@ -3,7 +3,7 @@
  * OSQP's workspace is one set of static variables that point at each other. It cannot be part of
  * mpc_state and does not serve two controllers: the one initialised last owns it, and of any other
  * every solve fails, which its caller is told. Of what OSQP keeps between calls only the iterate of
- * a departure counts; everything else is written anew by solver_start, so that nothing of a solve
+ * a departure counts; everything else is written anew by mpc_solver_start, so that nothing of a solve
  * gone wrong, a NaN for one, is left.
  *
  * The variables are in the order of `x`, stage by stage, the rows in that of `z`.
@@ -38,10 +38,10 @@ enum {
 
 static const mpc_state *owner;
 static int32_t is_loaded;
-static real_t values[MOST_VALUES];
+static mpc_real values[MOST_VALUES];
 
 /* The last controller initialised has the workspace. */
-void solver_claim(const mpc_state *state)
+void mpc_solver_claim(const mpc_state *state)
 {
     owner = state;
     is_loaded = 0;
@@ -71,7 +71,8 @@ static OSQPInt load_matrices(const mpc_state *state)
         }
     }
     for (int32_t k = 0; k < MPC_STAGES; k++) {
-        const stage_matrix *const after = (k < (MPC_STAGES - 1)) ? &state->stage[k + 1].a : NULL;
+        const mpc_stage_matrix *const after = (k < (MPC_STAGES - 1)) ? &state->stage[k + 1].a
+                                                                     : NULL;
         at = rows_put_columns(values, at, &state->stage[k].a, after);
     }
     return osqp_update_data_mat(&mpc_osqp_solver, values, OSQP_NULL, VARIABLES, &values[VARIABLES],
@@ -85,7 +86,7 @@ static OSQPInt load_vectors(const mpc_state *state)
         for (int32_t i = 0; i < MPC_VARS; i++) {
             values[(k * MPC_VARS) + i] = state->stage[k].q[i];
         }
-        real_t *const low = &values[VARIABLES + (k * MPC_ROWS)];
+        mpc_real *const low = &values[VARIABLES + (k * MPC_ROWS)];
         rows_put_bounds(low, &low[ROWS], &state->stage[k].b);
     }
     return osqp_update_data_vec(&mpc_osqp_solver, values, &values[VARIABLES],
@@ -105,7 +106,7 @@ static OSQPInt load_iterate(const mpc_state *state)
     return osqp_warm_start(&mpc_osqp_solver, values, &values[VARIABLES]);
 }
 
-void solver_start(mpc_state *state)
+void mpc_solver_start(mpc_state *state)
 {
     is_loaded = 0;
     if ((owner == state) && (is_sound() != 0)) {
@@ -126,7 +127,7 @@ static int32_t has_result(void)
                : 0;
 }
 
-int32_t solver_iterate(mpc_state *state, int32_t count)
+int32_t mpc_solver_iterate(mpc_state *state, int32_t count)
 {
     int32_t solved = 0;
     if ((owner == state) && (is_loaded != 0)) {

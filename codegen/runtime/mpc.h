@@ -28,22 +28,22 @@ extern "C" {
 
 /* What is known at the start of a second. Power in W, speed in m/s, temperature in degC. */
 typedef struct {
-    real_t soc;       /* measured state of charge, 0..1 */
-    real_t t_cl_degc; /* measured coolant temperature */
-    real_t demand_w;  /* power demand of the coming second, negative when braking */
-    real_t speed_mps; /* speed of the coming second */
+    mpc_real soc;       /* measured state of charge, 0..1 */
+    mpc_real t_cl_degc; /* measured coolant temperature */
+    mpc_real demand_w;  /* power demand of the coming second, negative when braking */
+    mpc_real speed_mps; /* speed of the coming second */
     /* accurate preview of the coming seconds; the first is the coming second itself */
-    real_t short_demand_w[MPC_SHORT];
-    real_t short_speed_mps[MPC_SHORT];
+    mpc_real short_demand_w[MPC_SHORT];
+    mpc_real short_speed_mps[MPC_SHORT];
     /* statistics of what lies beyond, block by block, in each block class by class (hard driving,
      * easy driving, braking): seconds, mean of the net power P0 = demand + auxiliaries (each
      * second clipped at the battery's charge limit before the mean is taken), mean speed, mean of
      * the internal battery power l(P0) with the engine off. 0 seconds where nothing is left.
      * mpc_forecast.h makes the preview from demand and speed of the trip. */
-    real_t long_duration_s[MPC_LONG];
-    real_t long_net_w[MPC_LONG];
-    real_t long_speed_mps[MPC_LONG];
-    real_t long_internal_off_w[MPC_LONG];
+    mpc_real long_duration_s[MPC_LONG];
+    mpc_real long_net_w[MPC_LONG];
+    mpc_real long_speed_mps[MPC_LONG];
+    mpc_real long_internal_off_w[MPC_LONG];
     int32_t short_count; /* seconds of the short preview that lie before arrival, 1..MPC_SHORT */
 } mpc_in;
 
@@ -63,10 +63,10 @@ enum {
 };
 
 typedef struct {
-    real_t p_eng_w;        /* engine power; 0 with the engine off */
-    real_t on_share;       /* planned on-share of the coming second; 0 if there is no new plan */
-    real_t relaxation_gap; /* relative slack of the relaxed curves; 0 if there is no new plan */
-    int32_t engine_on;     /* 0 or 1 */
+    mpc_real p_eng_w;        /* engine power; 0 with the engine off */
+    mpc_real on_share;       /* planned on-share of the coming second; 0 if there is no new plan */
+    mpc_real relaxation_gap; /* relative slack of the relaxed curves; 0 if there is no new plan */
+    int32_t engine_on;       /* 0 or 1 */
     int32_t rung;
     int32_t flags;
     int32_t iterations; /* of the solver in this call */
@@ -87,11 +87,11 @@ int32_t mpc_depart(mpc_state *state, const mpc_in *in);
 int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out);
 
 /* Copy the last solution in SI units, for diagnosis: MPC_STAGES rows of MPC_VARS variables in the
- * order of VAR_SOC and so on, and MPC_STAGES rows of MPC_ROWS duals (g of fuel per unit). */
-void mpc_plan(const mpc_state *state, real_t *x, real_t *duals);
+ * order of MPC_VAR_SOC and so on, and MPC_STAGES rows of MPC_ROWS duals (g of fuel per unit). */
+void mpc_plan(const mpc_state *state, mpc_real *x, mpc_real *duals);
 
 /* Layout of this build, so that a caller in another language can check its own: version of this
- * interface, sizeof real_t, mpc_in, mpc_out, mpc_state, then MPC_SHORT, MPC_LONG, MPC_VARS,
+ * interface, sizeof mpc_real, mpc_in, mpc_out, mpc_state, then MPC_SHORT, MPC_LONG, MPC_VARS,
  * MPC_ROWS, MPC_ITERATIONS, offset of mpc_in.short_count, of mpc_out.engine_on. */
 #define MPC_ABI_VERSION 2
 #define MPC_ABI_ENTRIES 12

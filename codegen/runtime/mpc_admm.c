@@ -18,10 +18,10 @@
 #include "mpc_rows_admm.h"
 
 /* What stands before the first stage: 0, as all that is static. */
-static const real_t nothing[MPC_VARS];
+static const mpc_real nothing[MPC_VARS];
 
 /* All memory of this solver is in the state: there is nothing to claim. */
-void solver_claim(const mpc_state *state) { (void)state; }
+void mpc_solver_claim(const mpc_state *state) { (void)state; }
 
 static const mpc_stage *before(const mpc_state *state, int32_t k)
 {
@@ -33,7 +33,7 @@ static const mpc_stage *after(const mpc_state *state, int32_t k)
     return (k < (MPC_STAGES - 1)) ? &state->stage[k + 1] : NULL;
 }
 
-void solver_start(mpc_state *state)
+void mpc_solver_start(mpc_state *state)
 {
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         mpc_stage *const stage = &state->stage[k];
@@ -45,7 +45,7 @@ void solver_start(mpc_state *state)
 /* t, in `work`: the solution of the linear system. */
 static void solve_linear_system(mpc_state *state)
 {
-    real_t unused[MPC_VARS];
+    mpc_real unused[MPC_VARS];
     for (int32_t i = 0; i < MPC_VARS; i++) {
         unused[i] = REAL(0.0);
     }
@@ -67,7 +67,7 @@ static void update_x(mpc_stage *stage)
     }
 }
 
-int32_t solver_iterate(mpc_state *state, int32_t count)
+int32_t mpc_solver_iterate(mpc_state *state, int32_t count)
 {
     for (int32_t n = 0; n < count; n++) {
         solve_linear_system(state);

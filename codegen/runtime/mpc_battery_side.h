@@ -6,7 +6,7 @@
 #include "mpc_real.h"
 
 /* Net power asked of engine and battery: braking beyond the charge limit is for the brakes. */
-static inline real_t battery_side_w(real_t demand_w)
+static inline mpc_real battery_side_w(mpc_real demand_w)
 {
     return real_clip(demand_w + mpc_par.aux_power_w, -mpc_par.battery_charge_max_w,
                      mpc_par.battery_discharge_max_w + mpc_par.engine_max_w);

@@ -12,18 +12,21 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-static void add_to(mpc_sum *to, real_t value)
+static void add_to(mpc_sum *to, mpc_real value)
 {
-    const real_t total = to->sum + value;
-    const real_t added = total - to->sum;
+    const mpc_real total = to->sum + value;
+    const mpc_real added = total - to->sum;
     to->lost += (to->sum - (total - added)) + (value - added);
     to->sum = total;
 }
 
-static real_t mean_of(const mpc_sum *of, real_t seconds) { return (of->sum + of->lost) / seconds; }
+static mpc_real mean_of(const mpc_sum *of, mpc_real seconds)
+{
+    return (of->sum + of->lost) / seconds;
+}
 
 /* Hard driving, easy driving, braking; all the same where there is one class. */
-static int32_t class_of(real_t demand_w)
+static int32_t class_of(mpc_real demand_w)
 {
 #if MPC_CLASSES > 1
     const int32_t easy_or_braking = (demand_w < mpc_par.class_braking_w) ? 2 : 1;
@@ -37,15 +40,15 @@ static int32_t class_of(real_t demand_w)
 /* Add one second of the trip to its block and class, or take it away: times 1 or -1. */
 static void count(mpc_forecast *forecast, int32_t second, int32_t times)
 {
-    const real_t demand_w = forecast->trip.demand_w[second];
-    const real_t net_w = battery_side_w(demand_w);
+    const mpc_real demand_w = forecast->trip.demand_w[second];
+    const mpc_real net_w = battery_side_w(demand_w);
     const int32_t block = second / forecast->block_s;
     mpc_class_sums *const to = &forecast->ahead[(block * MPC_CLASSES) + class_of(demand_w)];
-    const real_t sign = (real_t)times;
+    const mpc_real sign = (mpc_real)times;
     to->seconds += times;
     add_to(&to->net_w, sign * net_w);
     add_to(&to->speed_mps, sign * forecast->trip.speed_mps[second]);
-    add_to(&to->internal_off_w, sign * map_planned_internal_w(net_w));
+    add_to(&to->internal_off_w, sign * mpc_map_planned_internal_w(net_w));
 }
 
 static void sum_up(mpc_forecast *forecast)
@@ -66,7 +69,7 @@ static int32_t is_believable(const mpc_road *trip)
     int32_t fine = ((trip->steps >= 1) && (trip->steps <= MPC_LONGEST_TRIP_S)) ? 1 : 0;
     const int32_t steps = (fine != 0) ? trip->steps : 0;
     for (int32_t k = 0; k < steps; k++) {
-        fine &= check_second(trip->demand_w[k], trip->speed_mps[k]);
+        fine &= mpc_check_second(trip->demand_w[k], trip->speed_mps[k]);
     }
     return fine;
 }
@@ -117,8 +120,8 @@ static void fill_long(const mpc_forecast *forecast, int32_t is_arriving, mpc_in 
     for (int32_t k = 0; k < MPC_LONG; k++) {
         const mpc_class_sums *const of = &forecast->ahead[k];
         const int32_t is_masked = ((is_arriving != 0) || (of->seconds == 0)) ? 1 : 0;
-        const real_t seconds = (is_masked != 0) ? REAL(1.0) : (real_t)of->seconds;
-        const real_t share = (is_masked != 0) ? REAL(0.0) : REAL(1.0);
+        const mpc_real seconds = (is_masked != 0) ? REAL(1.0) : (mpc_real)of->seconds;
+        const mpc_real share = (is_masked != 0) ? REAL(0.0) : REAL(1.0);
         in->long_duration_s[k] = share * seconds;
         in->long_net_w[k] = share * mean_of(&of->net_w, seconds);
         in->long_speed_mps[k] = share * mean_of(&of->speed_mps, seconds);
@@ -126,7 +129,7 @@ static void fill_long(const mpc_forecast *forecast, int32_t is_arriving, mpc_in 
 #if MPC_CLASSES > 1
         in->long_internal_off_w[k] = share * mean_of(&of->internal_off_w, seconds);
 #else
-        in->long_internal_off_w[k] = map_planned_internal_w(in->long_net_w[k]);
+        in->long_internal_off_w[k] = mpc_map_planned_internal_w(in->long_net_w[k]);
 #endif
     }
 }

@@ -23,15 +23,15 @@ extern "C" {
 
 /* A road ahead, second by second. */
 typedef struct {
-    const real_t *demand_w;  /* power demand of each second, negative when braking */
-    const real_t *speed_mps; /* mean speed of each second */
-    int32_t steps;           /* seconds to arrival */
+    const mpc_real *demand_w;  /* power demand of each second, negative when braking */
+    const mpc_real *speed_mps; /* mean speed of each second */
+    int32_t steps;             /* seconds to arrival */
 } mpc_road;
 
 /* A sum and what its rounding has lost: twice the digits of one number. */
 typedef struct {
-    real_t sum;
-    real_t lost;
+    mpc_real sum;
+    mpc_real lost;
 } mpc_sum;
 
 /* What is ahead of one demand class of one block. */
@@ -78,7 +78,7 @@ int32_t mpc_in_from_preview(mpc_forecast *forecast, int32_t step, const mpc_road
  *     P = F v / eta_drive when driving, F v eta_regen when braking
  *
  * Of a second the mean speed counts and the difference of the speeds at its ends. */
-real_t mpc_demand_w(real_t speed_mps, real_t accel_mps2, real_t grade);
+mpc_real mpc_demand_w(mpc_real speed_mps, mpc_real accel_mps2, mpc_real grade);
 
 /* sizeof(mpc_forecast), for a caller in another language. */
 int32_t mpc_forecast_bytes(void);

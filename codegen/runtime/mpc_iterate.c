@@ -7,7 +7,7 @@
 #define LARGEST_FINITE REAL(1.0e30)
 
 /* A start at nothing: all variables 0, SOC and coolant temperature too. */
-void iterate_clear(mpc_state *state)
+void mpc_iterate_clear(mpc_state *state)
 {
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         for (int32_t i = 0; i < MPC_VARS; i++) {
@@ -23,7 +23,7 @@ void iterate_clear(mpc_state *state)
 
 /* Short stages move up by 0 or 1 (in equal time); the last keeps its values; long stages keep
  * their place. */
-void iterate_shift(mpc_state *state, int32_t by)
+void mpc_iterate_shift(mpc_state *state, int32_t by)
 {
     for (int32_t k = 0; k < (MPC_SHORT - 1); k++) {
         for (int32_t i = 0; i < MPC_VARS; i++) {
@@ -35,7 +35,7 @@ void iterate_shift(mpc_state *state, int32_t by)
     }
 }
 
-void iterate_to_solver_units(mpc_state *state)
+void mpc_iterate_to_solver_units(mpc_state *state)
 {
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         mpc_stage *const stage = &state->stage[k];
@@ -48,9 +48,9 @@ void iterate_to_solver_units(mpc_state *state)
     }
 }
 
-void iterate_to_si_units(mpc_state *state)
+void mpc_iterate_to_si_units(mpc_state *state)
 {
-    const real_t price = REAL(1.0) / state->cost;
+    const mpc_real price = REAL(1.0) / state->cost;
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         mpc_stage *const stage = &state->stage[k];
         for (int32_t i = 0; i < MPC_VARS; i++) {
@@ -63,7 +63,7 @@ void iterate_to_si_units(mpc_state *state)
 }
 
 /* False for NaN. */
-static int32_t all_below(const mpc_state *state, real_t limit)
+static int32_t all_below(const mpc_state *state, mpc_real limit)
 {
     int32_t fine = 1;
     for (int32_t k = 0; k < MPC_STAGES; k++) {
@@ -79,7 +79,7 @@ static int32_t all_below(const mpc_state *state, real_t limit)
 }
 
 /* Remember the iterate, in SI units, in case the solve that starts from it fails. */
-void iterate_keep(mpc_state *state)
+void mpc_iterate_keep(mpc_state *state)
 {
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         for (int32_t i = 0; i < MPC_VARS; i++) {
@@ -92,7 +92,7 @@ void iterate_keep(mpc_state *state)
 }
 
 /* Go back to what was kept; returns whether all of it is finite. */
-int32_t iterate_restore(mpc_state *state)
+int32_t mpc_iterate_restore(mpc_state *state)
 {
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         for (int32_t i = 0; i < MPC_VARS; i++) {
@@ -106,7 +106,4 @@ int32_t iterate_restore(mpc_state *state)
 }
 
 /* Solved or stopped at the limit with finite, plausible numbers, in solver units. */
-int32_t iterate_usable(const mpc_state *state)
-{
-    return all_below(state, LARGEST_PLAUSIBLE);
-}
+int32_t mpc_iterate_usable(const mpc_state *state) { return all_below(state, LARGEST_PLAUSIBLE); }

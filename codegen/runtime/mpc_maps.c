@@ -4,91 +4,91 @@
 #include "mpc_real.h"
 
 /* Fuel of the hot engine on its optimal line, engine on: linear between grid points. */
-real_t map_fuel_g_per_s(real_t p_eng_w)
+mpc_real mpc_map_fuel_g_per_s(mpc_real p_eng_w)
 {
-    const real_t place = real_clip(p_eng_w, REAL(0.0), mpc_par.engine_max_w) / mpc_par.fuel_step_w;
+    const mpc_real place = real_clip(p_eng_w, REAL(0.0), mpc_par.engine_max_w)
+                           / mpc_par.fuel_step_w;
     int32_t i = (int32_t)place;
     if (i > (MPC_FUEL_POINTS - 2)) {
         i = MPC_FUEL_POINTS - 2;
     }
-    const real_t left = mpc_par.fuel_g_per_s[i];
-    return left + ((mpc_par.fuel_g_per_s[i + 1] - left) * (place - (real_t)i));
+    const mpc_real left = mpc_par.fuel_g_per_s[i];
+    return left + ((mpc_par.fuel_g_per_s[i + 1] - left) * (place - (mpc_real)i));
 }
 
 /* alpha(T) = 1 + k ((T_hot - T) / span)^e below T_hot, else 1 */
-real_t map_cold_factor(real_t t_cl_degc)
+mpc_real mpc_map_cold_factor(mpc_real t_cl_degc)
 {
-    const real_t below = real_max(mpc_par.cold_hot_degc - t_cl_degc, REAL(0.0));
+    const mpc_real below = real_max(mpc_par.cold_hot_degc - t_cl_degc, REAL(0.0));
     return REAL(1.0)
            + (mpc_par.cold_k * REAL_POW(below / mpc_par.cold_span_k, mpc_par.cold_exponent));
 }
 
-static real_t at_soc(const real_t *table, real_t soc)
+static mpc_real at_soc(const mpc_real *table, mpc_real soc)
 {
-    real_t value = table[0];
+    mpc_real value = table[0];
     for (int32_t i = 1; i < MPC_SOC_POINTS; i++) {
-        const real_t left = mpc_par.soc_grid[i - 1];
-        const real_t share = (soc - left) / (mpc_par.soc_grid[i] - left);
-        const real_t inside = real_clip(share, REAL(0.0), REAL(1.0));
+        const mpc_real left = mpc_par.soc_grid[i - 1];
+        const mpc_real share = (soc - left) / (mpc_par.soc_grid[i] - left);
+        const mpc_real inside = real_clip(share, REAL(0.0), REAL(1.0));
         value += (table[i] - table[i - 1]) * inside;
     }
     return value;
 }
 
 /* min(P_chg, I (U + R I)) with the current I that fills the battery to soc_max in a second */
-real_t map_charge_limit_w(real_t soc)
+mpc_real mpc_map_charge_limit_w(mpc_real soc)
 {
-    const real_t current = real_max(mpc_par.soc_max - soc, REAL(0.0)) * mpc_par.charge_c;
-    const real_t voltage = at_soc(mpc_par.open_circuit_v, soc)
-                           + (at_soc(mpc_par.resistance_charge_ohm, soc) * current);
+    const mpc_real current = real_max(mpc_par.soc_max - soc, REAL(0.0)) * mpc_par.charge_c;
+    const mpc_real voltage = at_soc(mpc_par.open_circuit_v, soc)
+                             + (at_soc(mpc_par.resistance_charge_ohm, soc) * current);
     return real_min(mpc_par.battery_charge_max_w, current * voltage);
 }
 
 /* min(P_dis, I (U - R I)) with the current I that empties the battery to soc_min in a second */
-real_t map_discharge_limit_w(real_t soc)
+mpc_real mpc_map_discharge_limit_w(mpc_real soc)
 {
-    const real_t voltage = at_soc(mpc_par.open_circuit_v, soc);
-    const real_t resistance = at_soc(mpc_par.resistance_discharge_ohm, soc);
-    const real_t most = voltage / (REAL(2.0) * resistance); /* beyond it, power falls */
-    const real_t emptying = real_max(soc - mpc_par.soc_min, REAL(0.0)) * mpc_par.charge_c;
-    const real_t current = real_min(emptying, most);
-    return real_min(mpc_par.battery_discharge_max_w,
-                    current * (voltage - (resistance * current)));
+    const mpc_real voltage = at_soc(mpc_par.open_circuit_v, soc);
+    const mpc_real resistance = at_soc(mpc_par.resistance_discharge_ohm, soc);
+    const mpc_real most = voltage / (REAL(2.0) * resistance); /* beyond it, power falls */
+    const mpc_real emptying = real_max(soc - mpc_par.soc_min, REAL(0.0)) * mpc_par.charge_c;
+    const mpc_real current = real_min(emptying, most);
+    return real_min(mpc_par.battery_discharge_max_w, current * (voltage - (resistance * current)));
 }
 
 /* Internal power of the battery, l(P) = U (U - sqrt(U^2 - 4 R P)) / (2 R), at the plan's SOC.
  * Written as 2 U P / (U + sqrt(...)), which loses no digits at small P. */
-real_t map_planned_internal_w(real_t power_w)
+mpc_real mpc_map_planned_internal_w(mpc_real power_w)
 {
-    const real_t power = real_min(power_w, mpc_par.battery_discharge_max_w);
-    const real_t voltage = mpc_par.plan_voltage_v;
-    const real_t resistance = (power >= REAL(0.0)) ? mpc_par.plan_resistance_discharge_ohm
-                                                   : mpc_par.plan_resistance_charge_ohm;
-    const real_t root = (voltage * voltage) - (REAL(4.0) * resistance * power);
+    const mpc_real power = real_min(power_w, mpc_par.battery_discharge_max_w);
+    const mpc_real voltage = mpc_par.plan_voltage_v;
+    const mpc_real resistance = (power >= REAL(0.0)) ? mpc_par.plan_resistance_discharge_ohm
+                                                     : mpc_par.plan_resistance_charge_ohm;
+    const mpc_real root = (voltage * voltage) - (REAL(4.0) * resistance * power);
     return (REAL(2.0) * voltage * power) / (voltage + REAL_SQRT(real_max(root, REAL(0.0))));
 }
 
-real_t pwa_alpha(real_t t_cl_degc)
+mpc_real mpc_pwa_alpha(mpc_real t_cl_degc)
 {
-    real_t most = (mpc_par.alpha_slope[0] * t_cl_degc) + mpc_par.alpha_intercept[0];
+    mpc_real most = (mpc_par.alpha_slope[0] * t_cl_degc) + mpc_par.alpha_intercept[0];
     for (int32_t i = 1; i < MPC_ALPHA_PIECES; i++) {
         most = real_max(most, (mpc_par.alpha_slope[i] * t_cl_degc) + mpc_par.alpha_intercept[i]);
     }
     return most;
 }
 
-real_t pwa_alpha_slope(real_t t_cl_degc)
+mpc_real mpc_pwa_alpha_slope(mpc_real t_cl_degc)
 {
-    real_t slope = mpc_par.alpha_slope[0];
+    mpc_real slope = mpc_par.alpha_slope[0];
     for (int32_t i = 1; i < MPC_ALPHA_PIECES; i++) {
         slope = (t_cl_degc >= mpc_par.alpha_break[i]) ? mpc_par.alpha_slope[i] : slope;
     }
     return slope;
 }
 
-real_t pwa_battery(real_t power_w)
+mpc_real mpc_pwa_battery(mpc_real power_w)
 {
-    real_t most = (mpc_par.battery_slope[0] * power_w) + mpc_par.battery_intercept[0];
+    mpc_real most = (mpc_par.battery_slope[0] * power_w) + mpc_par.battery_intercept[0];
     for (int32_t j = 1; j < MPC_BATTERY_PIECES; j++) {
         most = real_max(most, (mpc_par.battery_slope[j] * power_w) + mpc_par.battery_intercept[j]);
     }

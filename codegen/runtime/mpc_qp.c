@@ -13,7 +13,7 @@
 #include "mpc_rows_values.h"
 
 /* Preview to stages: seconds first, then the classes of each block; what is past is masked. */
-void qp_road(mpc_state *state, const mpc_in *in)
+void mpc_qp_road(mpc_state *state, const mpc_in *in)
 {
     for (int32_t k = 0; k < MPC_SHORT; k++) {
         mpc_stage *const stage = &state->stage[k];
@@ -21,7 +21,7 @@ void qp_road(mpc_state *state, const mpc_in *in)
         stage->road.duration_s = (seen != 0) ? REAL(1.0) : REAL(0.0);
         stage->road.net_w = (seen != 0) ? battery_side_w(in->short_demand_w[k]) : REAL(0.0);
         stage->road.speed_mps = (seen != 0) ? in->short_speed_mps[k] : REAL(0.0);
-        stage->road.internal_off_w = map_planned_internal_w(stage->road.net_w);
+        stage->road.internal_off_w = mpc_map_planned_internal_w(stage->road.net_w);
     }
     for (int32_t k = 0; k < MPC_LONG; k++) {
         mpc_stage *const stage = &state->stage[MPC_SHORT + k];
@@ -33,19 +33,19 @@ void qp_road(mpc_state *state, const mpc_in *in)
 }
 
 /* Count SOC and coolant temperature from a newly measured state. */
-void qp_move_origin(mpc_state *state, real_t soc, real_t t_cl_degc)
+void mpc_qp_move_origin(mpc_state *state, mpc_real soc, mpc_real t_cl_degc)
 {
-    const real_t soc_step = state->origin_soc - soc;
-    const real_t t_cl_step = state->origin_t_cl_degc - t_cl_degc;
+    const mpc_real soc_step = state->origin_soc - soc;
+    const mpc_real t_cl_step = state->origin_t_cl_degc - t_cl_degc;
     for (int32_t k = 0; k < MPC_STAGES; k++) {
-        state->stage[k].x[VAR_SOC] += soc_step;
-        state->stage[k].x[VAR_T_CL] += t_cl_step;
+        state->stage[k].x[MPC_VAR_SOC] += soc_step;
+        state->stage[k].x[MPC_VAR_T_CL] += t_cl_step;
     }
     state->origin_soc = soc;
     state->origin_t_cl_degc = t_cl_degc;
 }
 
-void qp_linearise_cold(mpc_state *state)
+void mpc_qp_linearise_cold(mpc_state *state)
 {
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         state->stage[k].road.about_t_cl_degc = state->origin_t_cl_degc;
@@ -59,24 +59,24 @@ void qp_linearise_cold(mpc_state *state)
 /* The last plan, in SI units. alpha is taken at the mean temperature of a stage's own ends, for
  * demand classes at that of their block's: the class that is driven first in the plan is driven all
  * over the block on the road. */
-void qp_linearise_about_plan(mpc_state *state)
+void mpc_qp_linearise_about_plan(mpc_state *state)
 {
-    real_t start = real_clip(state->origin_t_cl_degc, COLDEST_DEGC, HOTTEST_DEGC);
+    mpc_real start = real_clip(state->origin_t_cl_degc, COLDEST_DEGC, HOTTEST_DEGC);
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         mpc_stage *const stage = &state->stage[k];
         stage->road.about_t_cl_start_degc = start;
-        stage->road.about_t_cl_end_degc = real_clip(
-            state->origin_t_cl_degc + stage->x[VAR_T_CL], COLDEST_DEGC, HOTTEST_DEGC);
+        stage->road.about_t_cl_end_degc =
+            real_clip(state->origin_t_cl_degc + stage->x[MPC_VAR_T_CL], COLDEST_DEGC, HOTTEST_DEGC);
         stage->road.about_t_cl_degc = REAL(0.5) * (start + stage->road.about_t_cl_end_degc);
-        stage->road.about_fuel_g_per_s = real_max(stage->x[VAR_FUEL], REAL(0.0));
-        stage->road.about_p_eng_w = real_max(stage->x[VAR_P_ENG], REAL(0.0));
+        stage->road.about_fuel_g_per_s = real_max(stage->x[MPC_VAR_FUEL], REAL(0.0));
+        stage->road.about_p_eng_w = real_max(stage->x[MPC_VAR_P_ENG], REAL(0.0));
         start = stage->road.about_t_cl_end_degc;
     }
     for (int32_t k = MPC_SHORT; k < MPC_STAGES; k += MPC_CLASSES) {
         mpc_stage *const block = &state->stage[k];
-        const stage_road *const last = &block[MPC_CLASSES - 1].road;
-        const real_t mean =
-            REAL(0.5) * (block[0].road.about_t_cl_start_degc + last->about_t_cl_end_degc);
+        const mpc_stage_road *const last = &block[MPC_CLASSES - 1].road;
+        const mpc_real mean = REAL(0.5)
+                              * (block[0].road.about_t_cl_start_degc + last->about_t_cl_end_degc);
         for (int32_t i = 0; i < MPC_CLASSES; i++) {
             block[i].road.about_t_cl_degc = mean;
         }
@@ -85,10 +85,10 @@ void qp_linearise_about_plan(mpc_state *state)
 
 static void scale_cost(mpc_state *state)
 {
-    real_t most = LEAST_COST;
+    mpc_real most = LEAST_COST;
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         const mpc_stage *const stage = &state->stage[k];
-        most = real_max(stage->q[VAR_FUEL] * stage->column[VAR_FUEL], most);
+        most = real_max(stage->q[MPC_VAR_FUEL] * stage->column[MPC_VAR_FUEL], most);
     }
     state->cost = REAL(1.0) / most;
     for (int32_t k = 0; k < MPC_STAGES; k++) {
@@ -98,15 +98,15 @@ static void scale_cost(mpc_state *state)
         }
     }
     mpc_stage *const last = &state->stage[MPC_STAGES - 1];
-    const real_t curvature =
-        REAL(2.0) * mpc_par.soc_penalty_g * state->cost * last->column[VAR_SOC];
-    last->hessian[VAR_SOC] = curvature * last->column[VAR_SOC];
-    last->q[VAR_SOC] += curvature * (state->origin_soc - mpc_par.soc_init);
+    const mpc_real curvature = REAL(2.0) * mpc_par.soc_penalty_g * state->cost
+                               * last->column[MPC_VAR_SOC];
+    last->hessian[MPC_VAR_SOC] = curvature * last->column[MPC_VAR_SOC];
+    last->q[MPC_VAR_SOC] += curvature * (state->origin_soc - mpc_par.soc_init);
 }
 
-void qp_update(mpc_state *state)
+void mpc_qp_update(mpc_state *state)
 {
-    stage_sums sums = {REAL(0.0)};
+    mpc_stage_sums sums = {REAL(0.0)};
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         mpc_stage *const stage = &state->stage[k];
         for (int32_t i = 0; i < MPC_VARS; i++) {
@@ -120,26 +120,26 @@ void qp_update(mpc_state *state)
 
 /* Slack of the relaxed inequalities at a stage, relative:
  * (|F - F_pwa| LHV + |G - G_pwa|) / max(|F| LHV + |G|, 1 kW); x in SI units. */
-real_t qp_relaxation_gap(const mpc_stage *stage)
+mpc_real mpc_qp_relaxation_gap(const mpc_stage *stage)
 {
-    const real_t on = stage->x[VAR_ON];
-    const real_t p_eng_w = stage->x[VAR_P_ENG];
-    const real_t fuel = stage->x[VAR_FUEL];
-    const real_t internal_w = stage->x[VAR_INTERNAL];
-    real_t least_fuel = (mpc_par.fuel_slope[0] * p_eng_w) + (mpc_par.fuel_intercept[0] * on);
+    const mpc_real on = stage->x[MPC_VAR_ON];
+    const mpc_real p_eng_w = stage->x[MPC_VAR_P_ENG];
+    const mpc_real fuel = stage->x[MPC_VAR_FUEL];
+    const mpc_real internal_w = stage->x[MPC_VAR_INTERNAL];
+    mpc_real least_fuel = (mpc_par.fuel_slope[0] * p_eng_w) + (mpc_par.fuel_intercept[0] * on);
     for (int32_t i = 1; i < MPC_FUEL_PIECES; i++) {
-        least_fuel = real_max(least_fuel, (mpc_par.fuel_slope[i] * p_eng_w)
-                                              + (mpc_par.fuel_intercept[i] * on));
+        least_fuel = real_max(least_fuel,
+                              (mpc_par.fuel_slope[i] * p_eng_w) + (mpc_par.fuel_intercept[i] * on));
     }
-    const real_t bat_w = (on * stage->road.net_w) - p_eng_w;
-    real_t least_w = (mpc_par.battery_slope[0] * bat_w) + (mpc_par.battery_intercept[0] * on);
+    const mpc_real bat_w = (on * stage->road.net_w) - p_eng_w;
+    mpc_real least_w = (mpc_par.battery_slope[0] * bat_w) + (mpc_par.battery_intercept[0] * on);
     for (int32_t j = 1; j < MPC_BATTERY_PIECES; j++) {
         least_w = real_max(least_w, (mpc_par.battery_slope[j] * bat_w)
                                         + (mpc_par.battery_intercept[j] * on));
     }
     least_w += (REAL(1.0) - on) * stage->road.internal_off_w;
-    const real_t slack_w = (REAL_ABS(fuel - least_fuel) * mpc_par.lhv_j_per_g)
-                           + REAL_ABS(internal_w - least_w);
-    const real_t size_w = (REAL_ABS(fuel) * mpc_par.lhv_j_per_g) + REAL_ABS(internal_w);
+    const mpc_real slack_w = (REAL_ABS(fuel - least_fuel) * mpc_par.lhv_j_per_g)
+                             + REAL_ABS(internal_w - least_w);
+    const mpc_real size_w = (REAL_ABS(fuel) * mpc_par.lhv_j_per_g) + REAL_ABS(internal_w);
     return slack_w / real_max(size_w, LEAST_SIZE_W);
 }

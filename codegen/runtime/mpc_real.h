@@ -6,7 +6,7 @@
 
 #include "mpc_config.h"
 
-#define REAL(literal) ((real_t)(literal))
+#define REAL(literal) ((mpc_real)(literal))
 
 #if MPC_F32
 #define REAL_SQRT(x) sqrtf(x)
@@ -32,13 +32,13 @@
  * the number wins. MPC_NATIVE_MINMAX, from the build, says that the processor has instructions for
  * fmin and fmax (as the Cortex-M7's FPv5 has); elsewhere they are slow library calls. */
 #if defined(MPC_NATIVE_MINMAX)
-static inline real_t real_min(real_t a, real_t b) { return REAL_FMIN(a, b); }
-static inline real_t real_max(real_t a, real_t b) { return REAL_FMAX(a, b); }
+static inline mpc_real real_min(mpc_real a, mpc_real b) { return REAL_FMIN(a, b); }
+static inline mpc_real real_max(mpc_real a, mpc_real b) { return REAL_FMAX(a, b); }
 #else
-static inline real_t real_min(real_t a, real_t b) { return (a < b) ? a : b; }
-static inline real_t real_max(real_t a, real_t b) { return (a > b) ? a : b; }
+static inline mpc_real real_min(mpc_real a, mpc_real b) { return (a < b) ? a : b; }
+static inline mpc_real real_max(mpc_real a, mpc_real b) { return (a > b) ? a : b; }
 #endif
-static inline real_t real_clip(real_t x, real_t low, real_t high)
+static inline mpc_real real_clip(mpc_real x, mpc_real low, mpc_real high)
 {
     return real_min(real_max(x, low), high);
 }

@@ -3,10 +3,11 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-mpc_command rules_decide(rule_memory *memory, const mpc_measured *seen)
+mpc_command mpc_rules_decide(mpc_rule_memory *memory, const mpc_measured *seen)
 {
-    const real_t net_w = seen->demand_w + mpc_par.aux_power_w;
-    const real_t requested_w = net_w + (mpc_par.rule_k_soc_w * (mpc_par.rule_soc_ref - seen->soc));
+    const mpc_real net_w = seen->demand_w + mpc_par.aux_power_w;
+    const mpc_real requested_w = net_w
+                                 + (mpc_par.rule_k_soc_w * (mpc_par.rule_soc_ref - seen->soc));
     const int32_t long_enough = (memory->on_for_s >= mpc_par.rule_min_on_s) ? 1 : 0;
     if ((requested_w > mpc_par.rule_on_w) || (seen->soc < mpc_par.rule_soc_forced)
         || (net_w > mpc_par.battery_discharge_max_w)) {
@@ -33,7 +34,7 @@ mpc_command rules_decide(rule_memory *memory, const mpc_measured *seen)
     } else {
         /* engine off */
     }
-    const mpc_command command = safety_admissible(wish, seen);
+    const mpc_command command = mpc_safety_admissible(wish, seen);
     if (command.engine_on == 0) {
         memory->on_for_s = 0;
     } else if (memory->on_for_s < mpc_par.rule_min_on_s) {

@@ -145,19 +145,19 @@ int main(int argc, char **argv)
     mpc_in in;
     mpc_out out;
     memset(&in, 0, sizeof in);
-    in.soc = (real_t)0.6;
-    in.t_cl_degc = (real_t)50;
+    in.soc = (mpc_real)0.6;
+    in.t_cl_degc = (mpc_real)50;
     in.short_count = MPC_SHORT;
     mpc_init(&state);
     for (int k = 0; k < atoi(argv[argc - 1]); k++) {
-        in.demand_w = (real_t)((k * 977) % 20000 - 4000);
+        in.demand_w = (mpc_real)((k * 977) % 20000 - 4000);
         for (int i = 0; i < MPC_SHORT; i++) {
-            in.short_demand_w[i] = (real_t)(((k + i) * 977) % 20000 - 4000);
+            in.short_demand_w[i] = (mpc_real)(((k + i) * 977) % 20000 - 4000);
         }
         for (int i = 0; i < MPC_LONG; i++) {
-            in.long_duration_s[i] = (real_t)((i * 13) % 60);
-            in.long_net_w[i] = (real_t)((i * 7919) % 15000 - 3000);
-            in.long_internal_off_w[i] = (real_t)1.02 * in.long_net_w[i];
+            in.long_duration_s[i] = (mpc_real)((i * 13) % 60);
+            in.long_net_w[i] = (mpc_real)((i * 7919) % 15000 - 3000);
+            in.long_internal_off_w[i] = (mpc_real)1.02 * in.long_net_w[i];
         }
         if (mpc_step(&state, &in, &out) & ~MPC_WARMING_UP) {
             return 1;

@@ -24,11 +24,11 @@ static int32_t below(int32_t limit)
 }
 static mpc_road road(int32_t steps)
 {
-    real_t *const demand_w = malloc(sizeof(real_t) * (size_t)(steps + (steps == 0)));
-    real_t *const speed_mps = malloc(sizeof(real_t) * (size_t)(steps + (steps == 0)));
+    mpc_real *const demand_w = malloc(sizeof(mpc_real) * (size_t)(steps + (steps == 0)));
+    mpc_real *const speed_mps = malloc(sizeof(mpc_real) * (size_t)(steps + (steps == 0)));
     for (int32_t k = 0; k < steps; k++) {
-        demand_w[k] = (real_t)(below(200001) - 100000);
-        speed_mps[k] = (real_t)below(151);
+        demand_w[k] = (mpc_real)(below(200001) - 100000);
+        speed_mps[k] = (mpc_real)below(151);
     }
     const mpc_road made = {demand_w, speed_mps, steps};
     return made;
@@ -44,8 +44,8 @@ int main(void)
     static mpc_forecast forecast;
     mpc_in in = {0};
     mpc_out out;
-    in.soc = (real_t)0.6;
-    in.t_cl_degc = (real_t)50;
+    in.soc = (mpc_real)0.6;
+    in.t_cl_degc = (mpc_real)50;
     for (int32_t trip = 0; trip < 300; trip++) {
         const mpc_road said = road(below(4) ? below(90) : below(2));
         const int32_t refused = mpc_forecast_start(&forecast, &said);

@@ -35,8 +35,8 @@ EMBEDDED = (Path(__file__).parents[2] / "docs" / "embedded.md").read_text("utf-8
 MAIN_C = """
 #include "board.h"
 #include "mpc_forecast.h"
-static const real_t demand_w[] = {@DEMAND@};
-static const real_t speed_mps[] = {@SPEED@};
+static const mpc_real demand_w[] = {@DEMAND@};
+static const mpc_real speed_mps[] = {@SPEED@};
 static mpc_forecast forecast;
 static mpc_in in;
 static uint32_t ticks;
@@ -44,7 +44,7 @@ int main(void)
 {
     static const char name[] = "answer";
     const int32_t file = board_open_write(name, sizeof(name) - 1u);
-    const mpc_road trip = {demand_w, speed_mps, (int32_t)(sizeof(demand_w) / sizeof(real_t))};
+    const mpc_road trip = {demand_w, speed_mps, (int32_t)(sizeof(demand_w) / sizeof(mpc_real))};
     board_start_timer();
     uint32_t start = board_ticks();
     int32_t result = mpc_forecast_start(&forecast, &trip);

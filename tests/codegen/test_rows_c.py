@@ -38,8 +38,8 @@ def numbers(text: str) -> dict[str, int]:
 
 def test_python_and_c_number_variables_rows_and_entries_alike() -> None:
     found, rows = numbers(types_h()), Rows(fuel=FUEL, battery=BATTERY)
-    assert {f"VAR_{var.name}": var.value for var in Var}.items() <= found.items()
-    assert {f"ROW_{r.name.upper()}": rows.first(r.name) for r in ROWS}.items() <= found.items()
+    assert {f"MPC_VAR_{var.name}": var.value for var in Var}.items() <= found.items()
+    assert {f"MPC_ROW_{r.name.upper()}": rows.first(r.name) for r in ROWS}.items() <= found.items()
     assert (found["MPC_VARS"], found["MPC_ROWS"]) == (VARS, rows.count)
     structure = QpStructure(3, rows)
     assert found["MPC_ENTRIES"] == len(structure.index)
@@ -73,7 +73,7 @@ def test_c_has_the_value_of_the_formula_to_the_last_bit() -> None:
     files = {name: project[name] for name in ("mpc_config.h", "mpc_real.h")}
     body = "\n".join(lines)
     files["formulas.c"] = (
-        f'#include "mpc_real.h"\nvoid evaluate(const real_t *x, real_t *y)\n{{\n{body}\n}}\n'
+        f'#include "mpc_real.h"\nvoid evaluate(const mpc_real *x, mpc_real *y)\n{{\n{body}\n}}\n'
     )
     library = ctypes.CDLL(str(compiled(files)))
     for x in rng.uniform(0.1, 10.0, (20, 3)):

@@ -98,9 +98,14 @@ def test_other_settings(vehicle_changes: dict[str, object], changes: dict[str, o
 @pytest.mark.parametrize(
     ("file", "old", "new", "part"),
     [
-        ("mpc_rows_admm.h", "(a->p_eng_min.on * x[VAR_ON])", "x[VAR_ON]", "matrices"),
+        ("mpc_rows_admm.h", "(a->p_eng_min.on * x[MPC_VAR_ON])", "x[MPC_VAR_ON]", "matrices"),
         ("mpc_rows_admm.h", "b->t_cl_max_high", "REAL(1.0e30)", "matrices"),
-        ("mpc_rows_values.h", "q[VAR_T_SLACK] += mpc_par", "q[VAR_T_SLACK] -= mpc_par", "matrices"),
+        (
+            "mpc_rows_values.h",
+            "q[MPC_VAR_T_SLACK] += mpc_par",
+            "q[MPC_VAR_T_SLACK] -= mpc_par",
+            "matrices",
+        ),
         # the solver's own work: the matrix is right, what is found with it is not
         ("mpc_rows_admm.h", "m_fuel_fuel += a->fuel[i].fuel * a->fuel[i].fuel;", "", "optimum"),
     ],

@@ -103,7 +103,7 @@ class GeneratedQp:
         x in SI units, shape (stages * VARS,)
         """
         for _ in range(SLICES):
-            self._reader.solver_iterate(self._state, SLICE)
+            self._reader.mpc_solver_iterate(self._state, SLICE)
             x, dual = np.empty(self._columns), np.empty(self._rows)
             self.library.plan(self._state, _pointer(x), _pointer(dual))
             if self._residual(x.ravel(), dual.ravel()) < tolerance:

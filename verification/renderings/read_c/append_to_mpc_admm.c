@@ -6,12 +6,12 @@
 #define FAR REAL(1.0e36) /* far beyond what stands for no bound */
 
 /* Entries of the matrix, (stages, rows, variables): for the stage itself and the one before. */
-void reader_matrix(const mpc_state *state, real_t *here, real_t *before)
+void reader_matrix(const mpc_state *state, mpc_real *here, mpc_real *before)
 {
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         for (int32_t i = 0; i < MPC_VARS; i++) {
-            real_t unit[MPC_VARS] = {REAL(0.0)};
-            real_t value[MPC_ROWS];
+            mpc_real unit[MPC_VARS] = {REAL(0.0)};
+            mpc_real value[MPC_ROWS];
             unit[i] = REAL(1.0);
             rows_multiply(&state->stage[k], unit, nothing, value);
             for (int32_t r = 0; r < MPC_ROWS; r++) {
@@ -26,7 +26,7 @@ void reader_matrix(const mpc_state *state, real_t *here, real_t *before)
 }
 
 /* Where the duals of all rows of a stage would leave its products with the matrix. */
-static void reader_clip(const mpc_stage *stage, real_t dual, real_t *bound)
+static void reader_clip(const mpc_stage *stage, mpc_real dual, mpc_real *bound)
 {
     mpc_stage probe = *stage;
     for (int32_t i = 0; i < MPC_VARS; i++) {
@@ -43,7 +43,7 @@ static void reader_clip(const mpc_stage *stage, real_t dual, real_t *bound)
 }
 
 /* Bounds and row scales, (stages, rows). */
-void reader_rows(const mpc_state *state, real_t *low, real_t *high, real_t *scale)
+void reader_rows(const mpc_state *state, mpc_real *low, mpc_real *high, mpc_real *scale)
 {
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         reader_clip(&state->stage[k], -FAR, &low[k * MPC_ROWS]);
@@ -55,7 +55,7 @@ void reader_rows(const mpc_state *state, real_t *low, real_t *high, real_t *scal
 }
 
 /* Cost, its diagonal curvature and column scales, (stages, variables). */
-void reader_columns(const mpc_state *state, real_t *gradient, real_t *hessian, real_t *scale)
+void reader_columns(const mpc_state *state, mpc_real *gradient, mpc_real *hessian, mpc_real *scale)
 {
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         const mpc_stage *const stage = &state->stage[k];

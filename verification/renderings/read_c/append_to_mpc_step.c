@@ -3,17 +3,17 @@
 
 /* Make the values of a second, expanded about a plan: x in SI units, (stages, variables). Returns
  * the scale of the cost, in units of the solver per g. */
-real_t reader_prepare(mpc_state *state, const mpc_in *in, const real_t *x)
+mpc_real reader_prepare(mpc_state *state, const mpc_in *in, const mpc_real *x)
 {
     mpc_init(state);
-    (void)check_measured(&state->good, in);
+    (void)mpc_check_measured(&state->good, in);
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         for (int32_t i = 0; i < MPC_VARS; i++) {
             state->stage[k].x[i] = x[(k * MPC_VARS) + i];
         }
     }
-    state->phase = PHASE_RUNNING;
+    state->phase = MPC_PHASE_RUNNING;
     prepare(state, in);
-    state->phase = PHASE_DEPARTING; /* from here on the iterate is in the solver's units */
+    state->phase = MPC_PHASE_DEPARTING; /* from here on the iterate is in the solver's units */
     return state->cost;
 }
