@@ -126,10 +126,13 @@ def compare(
         if trip.cycle.name in [other.cycle.name for other in trips]:
             raise InputError(f"cycle {trip.cycle.name!r} is named twice")
         trips.append(trip)
+    # before any run, so that what does not fit is refused then
+    of_first = [make_controller(what, trip, chosen) for trip in trips[:1] for what in wanted]
     runs = []
     for trip in trips:  # one after the other, so that step times are not disturbed
-        for what in wanted:
+        for i, what in enumerate(wanted):
             name = what if isinstance(what, str) else what.name
             report = next_job(f"{trip.cycle.name}, {name}") if next_job is not None else None
-            runs.append(drive(trip, make_controller(what, trip, chosen), progress=report))
+            made = of_first[i] if trip is trips[0] else make_controller(what, trip, chosen)
+            runs.append(drive(trip, made, progress=report))
     return Runs(runs, chosen)

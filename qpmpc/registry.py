@@ -105,7 +105,7 @@ def make_controller(
     elif isinstance(what, type):
         made = what(trip, settings)
     if isinstance(made, Planner):
-        made = RecedingHorizon(trip, made, settings)
+        made = RecedingHorizon(trip, made, None if made is what else settings)
     if not isinstance(made, Controller):
         raise InputError(
             f"controller {what!r} is neither a qpmpc.Controller nor a qpmpc.Planner, "

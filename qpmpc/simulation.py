@@ -4,9 +4,11 @@ import os
 from collections.abc import Mapping
 
 from qpmpc.closed_loop import OnStep, drive
-from qpmpc.controllers.base import Progress
+from qpmpc.controllers.base import Controller, Progress
+from qpmpc.controllers.receding_horizon import Planner
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle
+from qpmpc.errors import InputError
 from qpmpc.preview.forecast import Trace
 from qpmpc.registry import ControllerLike, make_controller, split_settings
 from qpmpc.results import Run
@@ -61,9 +63,17 @@ def prepared(
     InputError
         If a name or value is not allowed, or has no effect on a controller made already.
     """
-    if settings is None or isinstance(settings, ControllerSettings):
-        return trip, settings or ControllerSettings()
-    of_vehicle, chosen = split_settings(settings, controllers)
+    of_vehicle: dict[str, object] = {}
+    chosen = ControllerSettings()
+    if isinstance(settings, ControllerSettings):
+        chosen = settings
+    elif settings is not None:
+        of_vehicle, chosen = split_settings(settings, controllers)
+    made_already = all(isinstance(what, Controller | Planner) for what in controllers)
+    if made_already and chosen != ControllerSettings():
+        raise InputError(
+            "settings have no effect on a controller that is made already: make it with them"
+        )
     if of_vehicle:
         forecast = None if trip.forecast is trip.truth else trip.forecast
         trip = Trip(trip.cycle, trip.vehicle.with_settings(of_vehicle), forecast)

@@ -1,13 +1,32 @@
-"""Names of everything that can drive a cycle; plans replayed on the plant."""
+"""Simulation by names and objects: everything that can drive a cycle, and settings of it."""
+
+import json
+import logging
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
+from qpmpc.codegen import implementation
+from qpmpc.codegen.host_library import compiler
+from qpmpc.comparison import compare
+from qpmpc.controllers.ecms import Ecms
+from qpmpc.controllers.mh_qp import MhQp
+from qpmpc.controllers.rule_based import RuleBased
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle
-from qpmpc.errors import InputError
-from qpmpc.registry import CONTROLLERS, PLANNERS, check_controllers, controller_names
+from qpmpc.errors import InputError, QpmpcError
+from qpmpc.registry import (
+    CONTROLLERS,
+    PLANNERS,
+    check_controllers,
+    controller_names,
+    make_controller,
+    split_settings,
+)
 from qpmpc.simulation import simulate
+from qpmpc.trip import Trip
 from qpmpc.vehicle import load_vehicle
 from qpmpc.verification.dynamic_programming import DpSettings, solve_dp
 
@@ -48,3 +67,150 @@ def test_plan_of_dynamic_programming_is_replayed_exactly(trip, tmp_path, monkeyp
     np.testing.assert_allclose(replayed.trajectory.t_cl_degc, plan.t_cl_degc, atol=1e-6)
     assert replayed.fuel_g == pytest.approx(plan.fuel_total_g, rel=1e-9)
     assert np.isnan(replayed.trajectory.step_time_s).all()
+
+
+# settings
+
+
+def test_settings_of_vehicle_and_controller_in_one_call(trip):
+    both = {"thermal.t_amb_degc": -15, "trip.soc_init": 0.55, "mh_qp.admm.iterations": 7}
+    run = simulate(trip, "mh-qp", settings=both)
+    assert run.vehicle.thermal.t_amb_degc == -15.0
+    assert run.trajectory.soc[0] == 0.55
+    assert set(run.trajectory.iterations) == {7}
+    cold = load_vehicle().with_settings({"thermal.t_amb_degc": -15, "trip.soc_init": 0.55})
+    of_mh_qp = ControllerSettings().with_settings({"mh_qp.admm.iterations": 7})
+    apart = simulate(trip, "mh-qp", cold, settings=of_mh_qp)
+    np.testing.assert_array_equal(run.trajectory.soc, apart.trajectory.soc)
+    assert run.vehicle == apart.vehicle
+
+
+def test_settings_of_the_vehicle_leave_a_trip_its_forecast(trip):
+    shorter = Cycle.from_samples("shorter", trip.time_s[:15], trip.speed_mps[:15])
+    warm = {"thermal.t_amb_degc": 10.0}
+    run = simulate(Trip(trip, forecast=shorter), "mh-qp", settings=warm)
+    car = load_vehicle().with_settings(warm)
+    same = simulate(Trip(trip, car, Trip(shorter).truth), "mh-qp")
+    np.testing.assert_array_equal(run.trajectory.p_eng_w, same.trajectory.p_eng_w)
+
+
+def test_settings_that_come_too_late_are_refused(trip):
+    """A controller that is made already would not see them."""
+    road = Trip(trip)
+    late = {"ecms.factor": 3.0}
+    for made in (RuleBased(road), MhQp(road), MhQp(road).planner):
+        for settings in (late, ControllerSettings().with_settings(late)):
+            with pytest.raises(InputError, match="made already"):
+                simulate(road, made, settings=settings)
+        simulate(road, made, settings=ControllerSettings())
+    with pytest.raises(QpmpcError, match="was made for"):
+        simulate(road, RuleBased(road), settings={"thermal.t_amb_degc": -15.0})
+    runs = compare(road, [RuleBased(road), Ecms], settings=late)  # there they reach one of two
+    assert [run.controller for run in runs] == ["rule-based", "ecms"]
+
+
+@pytest.mark.parametrize(
+    ("old", "value", "new"),
+    [
+        ("mh_qp.osqp.iterations", 25, "mh_qp.admm.iterations"),
+        ("mh_qp.osqp.sigma", 1e-6, "mh_qp.admm.proximal_weight"),
+        ("mh_qp_paper.osqp.rho", 0.1, "mh_qp_paper.admm.rho"),
+        ("baseline_mpc.osqp.cold_iterations", 100, "baseline_mpc.admm.cold_iterations"),
+        ("mh_qp.solver", "generated", "mh_qp.implementation=c"),
+        ("mh_qp.solver", "auto", "mh_qp.implementation=auto"),
+    ],
+)
+def test_old_names_are_one_line_with_the_new_one(trip, old, value, new):
+    for use in (
+        lambda: split_settings({old: value}),
+        lambda: ControllerSettings().with_settings({old: value}),
+        lambda: simulate(trip, "mh-qp", settings={old: value}),
+    ):
+        with pytest.raises(InputError) as refusal:
+            use()
+        line = str(refusal.value)
+        assert line.startswith(old)
+        assert line.endswith(f"is now called {new}")
+        assert "\n" not in line
+
+
+# C or Python
+
+BEYOND_C = [
+    ({"mh_qp.solver": "piqp"}, "mh_qp.solver=piqp"),
+    ({"mh_qp.admm.status_tolerance": 1e-5}, "mh_qp.admm.status_tolerance"),
+]
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+@pytest.mark.parametrize(("chosen", "named"), BEYOND_C)
+def test_what_generated_c_cannot_do_is_refused_where_c_is_asked_for(trip, chosen, named):
+    with pytest.raises(InputError) as refusal:
+        simulate(trip, "mh-qp", settings={**chosen, "mh_qp.implementation": "c"})
+    assert named in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+@pytest.mark.parametrize(("chosen", "named"), BEYOND_C)
+def test_auto_falls_back_to_python_and_says_so(trip, caplog, chosen, named):
+    implementation._say_once.cache_clear()
+    with caplog.at_level(logging.WARNING):
+        run = simulate(trip, "mh-qp", settings=chosen)
+        (remark,) = run.remarks
+        assert "\n" not in remark
+        assert "runs in Python, not in C" in remark
+        assert named in remark
+        assert [record.getMessage() for record in caplog.records] == [remark]
+        assert caplog.records[0].name == "qpmpc"
+        simulate(trip, "mh-qp", settings=chosen)
+    assert len(caplog.records) == 1  # once a process
+    summary = run.summary()
+    assert summary["solver"]["implementation"] == "python"
+    assert summary["remarks"] == [remark]
+    asked = simulate(trip, "mh-qp", settings={**chosen, "mh_qp.implementation": "python"})
+    assert asked.remarks == ()
+    np.testing.assert_array_equal(asked.trajectory.p_eng_w, run.trajectory.p_eng_w)
+
+
+def test_a_rival_with_settings_of_admm_is_refused(trip):
+    for implementation_ in ("auto", "python"):
+        chosen = {
+            "mh_qp.solver": "piqp",
+            "mh_qp.admm.iterations": 25,
+            "mh_qp.implementation": implementation_,
+        }
+        with pytest.raises(InputError, match=r"mh_qp\.admm has no effect") as refusal:
+            simulate(trip, "mh-qp", settings=chosen)
+        assert "mh_qp.solver=piqp" in str(refusal.value)
+        assert "\n" not in str(refusal.value)
+
+
+def test_an_unknown_solver_is_refused_with_those_there_are(trip):
+    with pytest.raises(InputError, match=r"'gurobi'.*osqp.*piqp"):
+        simulate(trip, "mh-qp", settings={"mh_qp.solver": "gurobi"})
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+def test_the_fallback_is_one_line_on_stderr(trip, tmp_path):
+    file = tmp_path / "trip.csv"
+    rows = zip(trip.time_s.tolist(), trip.speed_mps.tolist(), strict=True)
+    file.write_text("time_s,speed_mps\n" + "".join(f"{t},{v}\n" for t, v in rows))
+    command = [sys.executable, "-m", "qpmpc", "simulate", file, "--set", "mh_qp.solver=piqp"]
+    done = subprocess.run(
+        [*command, "--json", tmp_path / "run.json"], capture_output=True, text=True, check=True
+    )
+    (line,) = done.stderr.splitlines()
+    assert "runs in Python, not in C" in line
+    assert json.loads((tmp_path / "run.json").read_text())["remarks"] == [line]
+
+
+def test_piqp_named_by_settings_drives_as_the_backend_given(trip):
+    road = Trip(trip)
+    chosen = {"mh_qp.implementation": "python", "mh_qp.solver": "piqp"}
+    by_name = simulate(road, "mh-qp", settings=chosen)
+    by_argument = simulate(road, MhQp(road, solver="piqp"))
+    assert by_name.solver == by_argument.solver == "piqp"
+    np.testing.assert_array_equal(by_name.trajectory.p_eng_w, by_argument.trajectory.p_eng_w)
+    made = make_controller("mh-qp", road, ControllerSettings().with_settings(chosen))
+    assert (made.implementation, made.solver_name) == ("python", "piqp")

@@ -58,6 +58,7 @@ class Controller(ABC):
     has_safety_layer: ClassVar[bool] = False
     # whether it decides from second to second, so that the time of a step means something
     decides_online: ClassVar[bool] = True
+    _under_way: bool | None = None  # None as long as __init__ has not run
 
     def __init__(self, trip: Trip, settings: ControllerSettings | None = None) -> None:
         self.trip = trip
@@ -82,6 +83,8 @@ class Controller(ABC):
 
     def decide(self, seen: Observation) -> Decision:
         """Run one second: `step`, then the safety layer."""
+        if self._under_way is None:
+            raise base_not_called(self)
         if not self._under_way:
             self.begin(self.trip)
         made = self.step(seen)
@@ -98,10 +101,8 @@ class Controller(ABC):
         QpmpcError
             If the controller was made for another trip, or has driven and was not reset.
         """
-        if not hasattr(self, "trip"):
-            raise QpmpcError(
-                f"{type(self).__name__}.__init__ must call super().__init__(trip, settings)"
-            )
+        if self._under_way is None:
+            raise base_not_called(self)
         if not trip.same_as(self.trip):
             raise QpmpcError(
                 f"controller {self.name!r} was made for {self.trip!r} and cannot drive {trip!r}: "
@@ -129,3 +130,8 @@ class Controller(ABC):
         if self.Settings is None:
             raise QpmpcError(f"{type(self).__name__} declares no Settings")
         return self.settings.of(self.name.replace("-", "_"), self.Settings())
+
+
+def base_not_called(made: object) -> QpmpcError:
+    """Return what to raise of an object whose `__init__` has not called that of its base."""
+    return QpmpcError(f"{type(made).__name__}.__init__ must call super().__init__(trip, settings)")

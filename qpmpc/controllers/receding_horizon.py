@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel
 
-from qpmpc.controllers.base import Controller, Decision, Progress
+from qpmpc.controllers.base import Controller, Decision, Progress, base_not_called
 from qpmpc.controllers.rule_based import RuleBased
 from qpmpc.controllers.settings import ControllerSettings
+from qpmpc.errors import QpmpcError
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.plant import Command
 
@@ -104,13 +105,26 @@ class RecedingHorizon(Controller):
     Parameters
     ----------
     trip : to be driven
-    planner : made for the same trip
-    settings : of all controllers; `rule_based` has the thresholds of the last rung
+    planner : made for the same trip; its forecast may be another one
+    settings : of all controllers; `rule_based` has the thresholds of the last rung. Those of the
+        planner if None
+
+    Raises
+    ------
+    QpmpcError
+        If the planner was made for another trip.
     """
 
     def __init__(
         self, trip: Trip, planner: Planner, settings: ControllerSettings | None = None
     ) -> None:
+        if not hasattr(planner, "trip") or not hasattr(planner, "settings"):
+            raise base_not_called(planner)
+        if not trip.same_road_as(planner.trip):
+            raise QpmpcError(
+                f"planner {planner.name!r} was made for {planner.trip!r} and cannot plan {trip!r}: "
+                "make one for this trip"
+            )
         super().__init__(trip, settings or planner.settings)
         self.planner = planner
         self.name, self.solver_name = planner.name, planner.solver_name

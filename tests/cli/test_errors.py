@@ -41,6 +41,20 @@ def files(folder: Path) -> dict[str, bytes]:
         (["simulate", "nycc", "--set", "trip.soc_init=0.9"], ["soc_init"]),
         (["simulate", "nycc", "--set", "mh_qp.admm.iterations=0"], ["iterations"]),
         (["simulate", "nycc", "--set", "mh_qp.admm.iteration=9"], ["iteration", "iterations"]),
+        (["simulate", "nycc", "--set", "mh_qp.osqp.iterations=7"], ["mh_qp.admm.iterations"]),
+        (["compare", "nycc", "--set", "mh_qp.solver=generated"], ["mh_qp.implementation=c"]),
+        (
+            ["simulate", "nycc", "--set", "mh_qp.implementation=c", "--set", "mh_qp.solver=piqp"],
+            ["mh_qp.solver=piqp"],
+        ),
+        (
+            ["simulate", "nycc", "--set", "mh_qp.solver=piqp", "--set", "mh_qp.admm.iterations=25"],
+            ["mh_qp.admm", "mh_qp.solver=piqp"],
+        ),
+        (
+            ["compare", "nycc", "--set", "mh_qp.solver=piqp", "--set", "mh_qp.admm.iterations=25"],
+            ["mh_qp.admm", "mh_qp.solver=piqp"],
+        ),
         (["simulate", "nycc", "--json", "."], ["--json", "directory"]),
         (["simulate", "nycc", "--json", "file/run.json"], ["--json", "file"]),
         (["simulate", "nycc", "--out", "file"], ["--out", "file"]),

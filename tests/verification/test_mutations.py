@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import qpmpc.codegen.values
+import qpmpc.controllers.qp_planner
 import qpmpc.controllers.receding_horizon
 import qpmpc.preview.forecast
 import qpmpc.preview.stages
@@ -76,11 +77,21 @@ pytestmark = pytest.mark.slow
 
 
 @dataclass(frozen=True)
+class Replacement:
+    """`old` becomes `new` in the function `name` of `owner`."""
+
+    owner: Any
+    name: str
+    old: str
+    new: str
+
+
+@dataclass(frozen=True)
 class Mutation:
     """`old` becomes `new` in the function `name` of `owner`; `checks` should notice.
 
     `noticed` are beginnings of names of checks that must be among those that fail; without any,
-    one is enough.
+    one is enough. `also` is replaced too, where what is broken is written in two places.
     """
 
     title: str
@@ -90,6 +101,7 @@ class Mutation:
     new: str
     checks: tuple[Callable[..., Any], ...]
     noticed: tuple[str, ...] = ()
+    also: Replacement | None = None
 
 
 QP, STAGES, PLANT = (same_optimum,), (stages_agree,), (books_balance,)
@@ -259,6 +271,10 @@ MUTATIONS = [
         "engine on whatever the share", qpmpc.controllers.receding_horizon, "_at",
         "if plan.on_share[second] < ON_THRESHOLD", "if plan.on_share[second] < 0.0",
         (limits_kept, bound_below_everything, relaxation_tight),
+        also=Replacement(
+            qpmpc.controllers.qp_planner, "power_while_on_w",
+            "runs = on_share >= ON_THRESHOLD", "runs = on_share >= 0.0",
+        ),
     ),
 ]  # fmt: skip
 
@@ -280,7 +296,7 @@ def failures(*checks: Callable[..., Any]) -> list[str]:
     return [check.name for check in found if not check.passed]
 
 
-def mutate(monkeypatch: pytest.MonkeyPatch, mutation: Mutation) -> None:
+def mutate(monkeypatch: pytest.MonkeyPatch, mutation: Mutation | Replacement) -> None:
     member = inspect.getattr_static(mutation.owner, mutation.name)
     if isinstance(member, str):  # of the table
         assert member.count(mutation.old) == 1
@@ -308,6 +324,8 @@ def test_mutation_is_caught(monkeypatch, mutation):
     quick = [check for group in groups if group.quick for check in group.checks]
     assert set(mutation.checks) <= set(quick)
     mutate(monkeypatch, mutation)
+    if mutation.also is not None:
+        mutate(monkeypatch, mutation.also)
     monkeypatch.setattr(generated_qp, "SLICES", 10)  # what is wrong may never converge
     found = failures(*mutation.checks)
     assert found
