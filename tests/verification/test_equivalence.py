@@ -98,7 +98,7 @@ def test_other_settings(vehicle_changes: dict[str, object], changes: dict[str, o
 @pytest.mark.parametrize(
     ("file", "old", "new", "part"),
     [
-        ("mpc_rows_admm.h", "(a->p_eng_min.on * x[MPC_VAR_ON])", "x[MPC_VAR_ON]", "matrices"),
+        ("mpc_rows_admm.h", "(a->battery[i].on * x[MPC_VAR_ON])", "x[MPC_VAR_ON]", "matrices"),
         ("mpc_rows_admm.h", "b->t_cl_max_high", "REAL(1.0e30)", "matrices"),
         (
             "mpc_rows_values.h",
