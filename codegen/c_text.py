@@ -47,7 +47,7 @@ class Writer:
                 return f"{self.inner(left)} {_COMPARISONS[type(op)]} {self.inner(right)}"
             case ast.Call(func=ast.Name(id="where"), args=[condition, yes, no]):
                 test, *parts = [self.inner(part) for part in (condition, yes, no)]
-                return f"({test} ? {parts[0]} : {parts[1]})"
+                return f"{test} ? {parts[0]} : {parts[1]}"
             case ast.Call(func=ast.Name(id=name), args=arguments) if name in self._functions:
                 texts = [self.expression(a) for a in arguments if not _is_parameter_set(a)]
                 return f"{self._functions[name]}({', '.join(texts)})"
@@ -56,7 +56,7 @@ class Writer:
     def inner(self, node: ast.expr) -> str:
         """Write an expression that is part of another, in parentheses where it is one itself."""
         text = self.expression(node)
-        compound = isinstance(node, ast.BinOp | ast.Compare | ast.UnaryOp)
+        compound = isinstance(node, ast.BinOp | ast.Compare | ast.UnaryOp) or " ? " in text
         return f"({text})" if compound else text
 
     def lines(self, statements: Iterable[ast.stmt]) -> list[str]:

@@ -7,7 +7,7 @@ rows: a new variable or entry needs no edit.
 from collections.abc import Iterable, Iterator
 from itertools import combinations_with_replacement, permutations
 
-from qpmpc.codegen.rows_c import function, indented, is_unit, member, of_pieces, variable
+from qpmpc.codegen.rows_c import function, is_unit, member, of_pieces, struct, variable
 from qpmpc.qp.rows import ROWS, Entry, Row, Var, states
 
 
@@ -97,12 +97,8 @@ def factor_of(row: Entry, column: Entry) -> str:
 def factor_type(e: Elimination) -> str:
     """Return the type of a stage's factor."""
     names = [factor_of(*pair)[3:] for before in (True, False) for pair in e.factors(before)]
-    lines = [f"mpc_real {name};" for name in (*names, "inverse_d[MPC_VARS]")]
-    return (
-        "/* L D L' of a stage: what of L can differ from 0, as row_column; the columns of the\n"
-        " * states before too. */\n"
-        f"typedef struct {{\n{indented(lines)}}} mpc_stage_factor;\n"
-    )
+    comment = "L D L' of a stage: row_column of L where it can differ from 0, states before too."
+    return struct(comment, "mpc_stage_factor", (*names, "inverse_d[MPC_VARS]"))
 
 
 def factorise(e: Elimination) -> str:

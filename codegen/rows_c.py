@@ -11,7 +11,7 @@ from qpmpc.qp.quantities import ABOUT, INPUTS, ORIGIN, STAGE
 from qpmpc.qp.rows import ROWS, VARIABLES, Entry, Row, Var
 from qpmpc.vehicle import heat
 
-CURVES = ("fuel", "battery")
+PIECES = ("fuel_slope", "fuel_intercept", "battery_slope", "battery_intercept")
 FORMULAS: tuple[Callable[..., Any], ...] = (  # Python functions made into C
     *heat.FUNCTIONS,
     radiator_w_per_k,
@@ -101,71 +101,62 @@ def bound_members(row: Row) -> dict[str, str]:
 def bounds(row: Row) -> tuple[str | None, str | None]:
     """Return the lower and upper bound of a row in C; None without."""
     members = bound_members(row)
+    index = "[i]" if row.pieces else ""
+    texts = {side: f"b->{name}{index}" for side, name in members.items()}
+    low = texts.get("equal", texts.get("low", "REAL(0.0)"))
+    high = texts.get("equal", texts.get("high", "REAL(0.0)"))
+    return None if row.low is None else low, None if row.high is None else high
 
-    def text(side: str) -> str:
-        name = members.get("equal" if row.is_equality else side)
-        return f"b->{name}{'[i]' if row.pieces else ''}" if name else "REAL(0.0)"
 
-    return (
-        None if row.low is None else text("low"),
-        None if row.high is None else text("high"),
-    )
+def size(row: Row) -> str:
+    """Return the size of an array over the pieces of a row's curve."""
+    return f"[MPC_{row.pieces.upper()}_PIECES]" if row.pieces else ""
+
+
+def struct(comment: str, name: str, members: Iterable[str]) -> str:
+    """Return a structure type with its comment."""
+    complete = ("{", "}", ";")
+    lines = [line if line.endswith(complete) else f"mpc_real {line};" for line in members]
+    return f"/* {comment} */\ntypedef struct {{\n{indented(lines)}}} {name};\n"
 
 
 def types_h() -> str:
     """Return `mpc_rows.h`: numbers of variables and rows, entries and bounds of a stage."""
-    lines = [f"{variable(var)} = {var.value}," for var in Var] + [f"MPC_VARS = {len(Var)}"]
-    variables = f"/* Variables of a stage. */\nenum {{\n{indented(lines)}}};\n"
-    lines, at = [], "0"
+    variables = [f"{variable(var)} = {var.value}," for var in Var] + [f"MPC_VARS = {len(Var)}"]
+    places, at = [], "0"
     for row in ROWS:
-        lines.append(f"MPC_ROW_{row.name.upper()} = {at},")
-        count = f"MPC_{row.pieces.upper()}_PIECES" if row.pieces else "1"
-        at = f"MPC_ROW_{row.name.upper()} + {count}"
-    entries = [f"({len(r.terms)} * MPC_{r.pieces.upper()}_PIECES)" for r in ROWS if r.pieces]
+        name = f"MPC_ROW_{row.name.upper()}"
+        places.append(f"{name} = {at},")
+        at = f"{name} + {size(row).strip('[]') or 1}"
+    entries = [f"({len(r.terms)} * {size(r).strip('[]')})" for r in ROWS if r.pieces]
     entries.append(str(sum(len(row.terms) for row in ROWS if not row.pieces)))
-    lines += [
-        f"MPC_ROWS = {at},",
-        f"MPC_ENTRIES = {' + '.join(entries)}, /* of a stage */",
-        f"MPC_ENTRIES_BEFORE = {sum(e.before for row in ROWS for e in row.terms)} /* of them */",
-    ]
-    places = f"/* Rows of a stage. */\nenum {{\n{indented(lines)}}};\n"
-    lines = []
+    before = sum(entry.before for row in ROWS for entry in row.terms)
+    places.append(f"MPC_ROWS = {at},")
+    places.append(f"MPC_ENTRIES = {' + '.join(entries)}, /* of a stage */")
+    places.append(f"MPC_ENTRIES_BEFORE = {before} /* of them */")
+    matrix: list[str] = []
     for row in ROWS:
         if not is_unit(row):
-            lines += ["struct {", *(f"    mpc_real {entry.name};" for entry in row.terms)]
-            size = f"[MPC_{row.pieces.upper()}_PIECES]" if row.pieces else ""
-            lines.append(f"}} {row.name}{size};")
-    matrix = (
-        "/* Entries of a stage's rows. Rows of one entry are left out: it is 1 after scaling. */\n"
-        f"typedef struct {{\n{indented(lines)}}} mpc_stage_matrix;\n"
-    )
-    lines = [
-        f"mpc_real {name}{f'[MPC_{row.pieces.upper()}_PIECES]' if row.pieces else ''};"
-        for row in ROWS
-        for name in bound_members(row).values()
-    ]
-    limits = (
-        f"/* Bounds other than 0. */\ntypedef struct {{\n{indented(lines)}}} mpc_stage_bounds;\n"
-    )
-    sums = "/* What is summed up over the stages. */\n"
-    members = [f"mpc_real {name};" for name in _running()]
-    sums += f"typedef struct {{\n{indented(members)}}} mpc_stage_sums;\n"
-    about = [f"mpc_real {name};" for name in (*STAGE, *(f"about_{name}" for name in ABOUT))]
-    road = (
-        "/* The road, duration 0 for a masked stage, which passes the state on and costs nothing;\n"
-        " * and where the coolant's heat and the thermostat are expanded. */\n"
-        f"typedef struct {{\n{indented(about)}}} mpc_stage_road;\n"
-    )
+            inside = (f"    mpc_real {entry.name};" for entry in row.terms)
+            matrix += ["struct {", *inside, f"}} {row.name}{size(row)};"]
+    limits = [f"{name}{size(row)}" for row in ROWS for name in bound_members(row).values()]
     return header(
         "mpc_rows.h",
         "Variables, rows and entries of a stage.",
         ["mpc_config.h"],
-        variables,
-        places,
-        matrix,
-        limits,
-        road,
-        sums,
+        f"/* Variables of a stage. */\nenum {{\n{indented(variables)}}};\n",
+        f"/* Rows of a stage. */\nenum {{\n{indented(places)}}};\n",
+        struct(
+            "Rows of a stage. Of one entry they are 1 after scaling.", "mpc_stage_matrix", matrix
+        ),
+        struct("Bounds other than 0.", "mpc_stage_bounds", limits),
+        struct(
+            "The road, duration 0 for a masked stage, which passes the state on at no cost; and\n"
+            " * where the coolant's heat and the thermostat are expanded.",
+            "mpc_stage_road",
+            (*STAGE, *(f"about_{name}" for name in ABOUT)),
+        ),
+        struct("What is summed up over the stages.", "mpc_stage_sums", _running()),
     )
 
 
@@ -181,11 +172,7 @@ def _running() -> list[str]:
 def values_h(scalars: Iterable[str]) -> str:
     """Return `mpc_rows_values.h`: entries, bounds, scaling and cost of a stage."""
     names = {name: f"mpc_par.{name}" for name in scalars}
-    names |= {
-        f"{curve}_{part}": f"mpc_par.{curve}_{part}[i]"
-        for curve in CURVES
-        for part in ("slope", "intercept")
-    }
+    names |= {name: f"mpc_par.{name}[i]" for name in PIECES}
     names |= {name: f"road->{name}" for name in INPUTS}
     names |= {name: f"state->{name}" for name in ORIGIN}
     names |= {name: name for name, value in vars(rows).items() if isinstance(value, float)}
@@ -213,18 +200,14 @@ def _scale() -> str:
 
 
 def _fill(writer: Writer) -> str:
-    lines: list[str] = []
-    lines.append("const mpc_real is_last = (k == (MPC_STAGES - 1)) ? REAL(1.0) : REAL(0.0);")
+    lines = ["const mpc_real is_last = (k == (MPC_STAGES - 1)) ? REAL(1.0) : REAL(0.0);"]
     lines += writer.lines(parsed(rows.QUANTITIES))
     for row in ROWS:
         lines += of_pieces(row, _fill_row(row, writer))
     for entry, factor in rows.cost_terms().items():
         line = f"q[{variable(entry.var)}] += {writer.expression(factor)};"
-        lines += (
-            ["if (k > 0) {", f"    state->stage[k - 1].{line}", "}"]
-            if entry.before
-            else [f"stage->{line}"]
-        )
+        known = ["if (k > 0) {", f"    state->stage[k - 1].{line}", "}"]
+        lines += known if entry.before else [f"stage->{line}"]
     return function(
         "void rows_fill(mpc_state *state, int32_t k, mpc_stage_sums *sums)",
         "Entries and bounds of stage k, and what it adds to the cost. The first stage starts at\n"
@@ -260,8 +243,8 @@ def _fill_row(row: Row, writer: Writer) -> list[str]:
     for side, name in bound_members(row).items():
         bound = row.high if side == "high" else row.low
         if bound is not None:
-            index = "[i]" if row.pieces else ""
-            lines.append(f"b->{name}{index} = {writer.inner(bound)} * {scale};")
+            at = "[i]" if row.pieces else ""
+            lines.append(f"b->{name}{at} = {writer.inner(bound)} * {scale};")
     return lines
 
 

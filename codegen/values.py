@@ -28,28 +28,17 @@ EQUALITY_WIDTH = 1e-4  # solver units
 
 # What the C code has in common with the Python controller, by module: names in C and their values.
 CONSTANTS: dict[str, dict[str, float]] = {
-    receding_horizon.__name__: {"ON_THRESHOLD": receding_horizon.ON_THRESHOLD},
-    qp_planner.__name__: {
-        "FAILURES_FORGIVEN": qp_planner.FAILURES_FORGIVEN,
-        "LEAST_SIZE_W": qp_planner.LEAST_SIZE_W,
-    },
-    linearisation.__name__: {
-        "COLDEST_DEGC": linearisation.COLDEST_DEGC,
-        "HOTTEST_DEGC": linearisation.HOTTEST_DEGC,
-        "DEPARTURE_FUEL_G_PER_S": linearisation.DEPARTURE_FUEL_G_PER_S,
-        "DEPARTURE_P_ENG_W": linearisation.DEPARTURE_P_ENG_W,
-    },
-    safety.__name__: {
-        "SOC_MARGIN": safety.SOC_MARGIN,
-        "T_CL_MARGIN_K": safety.T_CL_MARGIN_K,
-        "T_CL_COOLING_K": safety.T_CL_COOLING_K,
-        "T_CL_NEAR_K": safety.T_CL_NEAR_K,
-        "BISECTIONS": safety.BISECTIONS,
-    },
-    stage_qp.__name__: {"LEAST_COST": stage_qp.LEAST_COST},
-    rows.__name__: {name: value for name, value in vars(rows).items() if isinstance(value, float)},
-    base.__name__: {"LARGEST_PLAUSIBLE": base.LARGEST_PLAUSIBLE},
-    demand.__name__: {"GRAVITY_MPS2": demand.GRAVITY_MPS2},
+    module.__name__: {name: getattr(module, name) for name in names.split()}
+    for module, names in (
+        (receding_horizon, "ON_THRESHOLD"),
+        (qp_planner, "FAILURES_FORGIVEN LEAST_SIZE_W"),
+        (linearisation, "COLDEST_DEGC HOTTEST_DEGC DEPARTURE_FUEL_G_PER_S DEPARTURE_P_ENG_W"),
+        (safety, "SOC_MARGIN T_CL_MARGIN_K T_CL_COOLING_K T_CL_NEAR_K BISECTIONS"),
+        (stage_qp, "LEAST_COST"),
+        (rows, "SHORTEST_SCALE_S REACH_MARGIN_SOC ACCURATE_STAGE_S SIGMA_FORCED"),
+        (base, "LARGEST_PLAUSIBLE"),
+        (demand, "GRAVITY_MPS2"),
+    )
 }
 
 

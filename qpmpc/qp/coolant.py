@@ -58,18 +58,22 @@ def thermostat_step(
     decay = where(ever > 0.0, exp(open_for), 1.0)
     settled = where(ever > 0.0, -expm1(open_for), 0.0)  # 1 - decay, exact for short stages too
     # the exponential, for as long as it is open; then the line, from u = 0
-    curved = aim + (start_k - aim) * decay
+    apart = start_k - aim
+    curved = aim + apart * decay
     closes = where(start_k >= 0.0, where(curved < 0.0, 1.0, 0.0), 0.0)
-    shut = where(closes > 0.0, start_k - aim, 1.0)
+    shut = where(closes > 0.0, apart, 1.0)
     ratio = where(closes > 0.0, shut / where(closes > 0.0, -aim, 1.0), 1.0)
     line_s = duration_s - where(closes > 0.0, tau * log(ratio), 0.0)
 
     uncrossed = where(start_k >= 0.0, curved, straight)
     crossed = where(closes > 0.0, heat_w * line_s / capacity, uncrossed)
-    over_k = where(opens > 0.0, aim * settled, crossed)
+    opened = aim * settled
+    over_k = where(opens > 0.0, opened, crossed)
     closing = where(closes > 0.0, -aim / shut, where(start_k >= 0.0, decay, 1.0))
     per_start = where(opens > 0.0, decay, closing)
-    line = where(start_k >= 0.0, settled / slope, duration_s / capacity)
+    by_curve = settled / slope
+    by_line = duration_s / capacity
+    line = where(start_k >= 0.0, by_curve, by_line)
     bent = where(closes > 0.0, line_s / capacity + (1.0 + aim / shut) / slope, line)
-    per_heat = where(opens > 0.0, settled / slope + decay * closed_s / capacity, bent)
+    per_heat = where(opens > 0.0, by_curve + decay * closed_s / capacity, bent)
     return over_k, per_heat, per_start

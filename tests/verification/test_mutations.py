@@ -208,7 +208,7 @@ MUTATIONS = [
     ),
     Mutation(
         "radiator of a stage as open as at its end", physics_checks, "thermostat_step",
-        "aim * settled, crossed", "straight / (1.0 + duration_s / tau), crossed",
+        "opened = aim * settled", "opened = straight / (1.0 + duration_s / tau)",
         (thermostat_exact,),
     ),
     # scaling and warm start
