@@ -24,7 +24,7 @@ from qpmpc.verification.renderings.qp_cases import QpCase, random_cases, recorde
 VEHICLE = load_vehicle()
 ROUNDING = 1e-12
 OPTIMUM = 1e-6
-ALL = {"cvxpy", "casadi"} | ({"c"} if compiler() is not None else set())
+ALL = {"cvxpy"} | ({"c"} if compiler() is not None else set())
 
 
 def beginning(name: str, steps: int) -> Cycle:
@@ -140,7 +140,7 @@ def test_nothing_of_the_reader_is_in_a_generated_controller() -> None:
 def test_without_a_compiler_the_others_are_compared(monkeypatch) -> None:
     monkeypatch.setattr(qpmpc.verification.renderings.equivalence, "compiler", lambda: None)
     renderings, cases = made()
-    assert set(renderings.compare(cases[0])) == {"cvxpy", "casadi"}
+    assert set(renderings.compare(cases[0])) == {"cvxpy"}
 
 
 def test_twin_is_compiled_once_and_updated() -> None:

@@ -71,7 +71,6 @@ from qpmpc.verification.checks.relaxation_checks import expansion_small, relaxat
 from qpmpc.verification.checks.rendering_checks import one_qp
 from qpmpc.verification.nonlinear.solver import NlpSolver
 from qpmpc.verification.renderings import generated_qp
-from qpmpc.verification.renderings.casadi_qp import CasadiQp
 
 pytestmark = pytest.mark.slow
 
@@ -171,8 +170,7 @@ MUTATIONS = [
     ),
     Mutation(
         "alpha' = 0", rows, "QUANTITIES",
-        "pwa_alpha_slope(about_t_cl_degc) *", "0.0 *", (*QP, *RENDERINGS),
-        ("Matrices, casadi", "Optimum, casadi"),
+        "pwa_alpha_slope(about_t_cl_degc) *", "0.0 *", QP,
     ),
     Mutation(
         "wrong terminal band", qpmpc.qp.stage_qp, "qp_parameters",
@@ -231,13 +229,8 @@ MUTATIONS = [
         ("Matrices, cvxpy", "Optimum, cvxpy"),
     ),
     Mutation(
-        "CasADi with another terminal band", CasadiQp, "_soc_limits",
-        "max(settings.terminal_low", "max(0.99 * settings.terminal_low", RENDERINGS,
-        ("Matrices, casadi", "Optimum, casadi"),
-    ),
-    Mutation(
         "generated C with another terminal band", qpmpc.codegen.values, "_solver",
-        "osqp.relaxation,", "osqp.relaxation, 'terminal_soc_low': 0.59,", RENDERINGS,
+        "admm.relaxation,", "admm.relaxation, 'terminal_soc_low': 0.59,", RENDERINGS,
         ("Matrices, c", "Optimum, c"),
     ),
     # the nonlinear program

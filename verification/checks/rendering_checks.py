@@ -17,8 +17,7 @@ SEED = 1
 ENTRIES = 1e-12  # of rows of unit norm, in solver units: some hundred roundings
 OPTIMUM = 1e-6
 NAMES = {
-    "cvxpy": "The QP compiled by cvxpy from its equations",
-    "casadi": "The QP that CasADi derives from the bilinear problem",
+    "cvxpy": "The QP compiled by cvxpy",
     "c": "The QP that the generated C holds, asked of its own solver,",
 }
 F64_W = 1e-3  # after hundreds of steps of warm starts, each from the last

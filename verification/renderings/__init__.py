@@ -1,1 +1,1 @@
-"""The QP in numpy, cvxpy, CasADi and generated C: read out and compared entry by entry."""
+"""The QP in numpy, cvxpy and generated C: read out and compared entry by entry."""

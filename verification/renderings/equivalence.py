@@ -1,4 +1,4 @@
-"""One QP in four renderings, shown equal: numpy, cvxpy, CasADi by differentiation, generated C."""
+"""One QP in three renderings, shown equal: numpy, cvxpy, generated C."""
 
 import warnings
 from collections.abc import Callable
@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from qpmpc.codegen.controller import InputBuilder
@@ -18,13 +17,10 @@ from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.cvxpy_twin import CvxpyTwin
 from qpmpc.qp.linearisation import Linearisation
-from qpmpc.qp.rows import VARS, Var
 from qpmpc.qp.stage_qp import QpData, StageQp
 from qpmpc.solvers.base import Status
 from qpmpc.solvers.piqp import Piqp
-from qpmpc.solvers.timed import require
 from qpmpc.trip import Trip
-from qpmpc.verification.renderings.casadi_qp import CasadiQp
 from qpmpc.verification.renderings.cvxpy_matrices import cvxpy_matrices
 from qpmpc.verification.renderings.generated_qp import GeneratedQp
 from qpmpc.verification.renderings.matrices import Matrices, difference, matrices_of
@@ -32,7 +28,7 @@ from qpmpc.verification.renderings.qp_cases import QpCase, random_cases, recorde
 
 Floats = NDArray[np.float64]
 
-EXACT = 1e-10  # tolerance of the product's QP, solved by PIQP, and of CasADi's, by QOCO
+EXACT = 1e-10  # tolerance of PIQP on the product's QP
 CLARABEL_OPTIONS = {  # cvxpy's, in its units: grams. Its default regularisation costs digits
     "tol_gap_abs": 1e-9,
     "tol_gap_rel": 1e-9,
@@ -84,10 +80,12 @@ class Equivalence:
 
 
 class Renderings:
-    """The QP of one trip in its renderings: `cvxpy`, `casadi` and, with a C compiler, `c`.
+    """The QP of one trip in its renderings: `cvxpy` and, with a C compiler, `c`.
 
-    Each has a solver of its own: cvxpy calls Clarabel on what it compiles, CasADi's matrices go to
-    QOCO, the generated C iterates to the end, and the product's matrices go to PIQP.
+    All are made from one table of rows, so this holds the makers against each other; what the
+    table says is held against the equations by `independent.stage_program`. Each has a solver of
+    its own: cvxpy calls Clarabel on what it compiles, the generated C iterates to the end, and the
+    product's matrices go to PIQP.
 
     Parameters
     ----------
@@ -97,7 +95,7 @@ class Renderings:
     Raises
     ------
     QpmpcError
-        If CasADi, Clarabel, PIQP or QOCO is not installed.
+        If Clarabel or PIQP is not installed.
     """
 
     def __init__(self, trip: Trip, settings: ControllerSettings) -> None:
@@ -107,7 +105,6 @@ class Renderings:
         stages = self.preview.count
         self.qp = StageQp(vehicle, model, stages, chosen.qp, chosen.scaling)
         self.twin = CvxpyTwin(vehicle, model, stages, chosen.qp)
-        self.casadi = CasadiQp(vehicle, model, stages, chosen.qp)
         self.generated: GeneratedQp | None = None
         if compiler() is not None:
             blocks = chosen.horizon.block_count(trip.forecast.steps)
@@ -131,7 +128,6 @@ class Renderings:
         best = ours.value(data.scaling.primal(self._solve(data)))
         made: dict[str, Callable[[QpCase, QpData], tuple[Matrices, Floats]]] = {
             "cvxpy": self._by_cvxpy,
-            "casadi": self._by_casadi,
         }
         if self.generated is not None:
             made["c"] = self._by_c
@@ -161,42 +157,10 @@ class Renderings:
             except QpmpcError:
                 return matrices, np.full_like(data.q, np.nan)
 
-    def _by_casadi(self, case: QpCase, data: QpData) -> tuple[Matrices, Floats]:
-        column, cost = data.scaling.column, data.scaling.cost
-        weight = np.sqrt(self.qp.settings.regularisation / cost)
-        smoothing = (weight / column).reshape(-1, VARS)
-        smoothing[:, [Var.SOC, Var.T_CL]] = 0.0
-        matrices = self.casadi.matrices(*self.inputs(case), smoothing)
-        return matrices, _by_qoco(matrices, column, cost)
-
     def _by_c(self, case: QpCase, _: QpData) -> tuple[Matrices, Floats]:
         assert self.generated is not None
         matrices = self.generated.update(case.seen, case.x)
         return matrices, self.generated.solve(C_TOLERANCE)
-
-
-def _by_qoco(m: Matrices, column: Floats, cost: float) -> Floats:
-    """Optimum by QOCO, in units that make its tolerances mean the same as the product's."""
-    equal, upper = m.equal * column, m.upper * column
-    equal_norm, upper_norm = np.linalg.norm(equal, axis=1), np.linalg.norm(upper, axis=1)
-    solver = require("qoco", "qoco").QOCO()
-    solver.setup(
-        n=len(column),
-        m=len(upper),
-        p=len(equal),
-        P=sp.csc_matrix(np.triu(cost * m.hessian * np.multiply.outer(column, column))),
-        c=cost * m.gradient * column,
-        A=sp.csc_matrix(equal / equal_norm[:, None]),
-        b=m.equal_to / equal_norm,
-        G=sp.csc_matrix(upper / upper_norm[:, None]),
-        h=m.upper_to / upper_norm,
-        l=len(upper),
-        nsoc=0,
-        q=None,
-        abstol=EXACT,
-        reltol=EXACT,
-    )
-    return np.array(solver.solve().x) * column
 
 
 def check_equivalence(
@@ -218,7 +182,7 @@ def check_equivalence(
     Raises
     ------
     QpmpcError
-        If CasADi or a solver is not installed.
+        If a solver is not installed.
     """
     chosen = settings or ControllerSettings()
     renderings = Renderings(trip, chosen)
