@@ -13,7 +13,7 @@ from time import monotonic
 from types import TracebackType
 from typing import Any, Self
 
-from qpmpc.codegen.generate import Precision, Solver, generate
+from qpmpc.codegen.generate import Algorithm, Precision, generate
 from qpmpc.codegen.host_library import CodegenError, structures
 from qpmpc.codegen.values import Values
 
@@ -72,7 +72,7 @@ class Footprint:
 
 
 def build_firmware(
-    values: Values, precision: Precision, folder: Path, solver: Solver = "admm"
+    values: Values, precision: Precision, folder: Path, algorithm: Algorithm = "admm"
 ) -> Path:
     """Generate and compile the firmware of a controller; returns the ELF file.
 
@@ -82,7 +82,7 @@ def build_firmware(
         If a tool is missing or the compiler fails, for instance because it does not fit.
     """
     require_tools()
-    generate(values, folder, "cortex-m7", precision, solver)
+    generate(values, folder, "cortex-m7", precision, algorithm)
     return make_firmware(folder)
 
 

@@ -14,20 +14,20 @@ from qpmpc._version import __version__
 from qpmpc.codegen.examples import example_files
 from qpmpc.codegen.osqp_source import CONSTANT_ARRAYS, PREFIX, osqp_files, osqp_version
 from qpmpc.codegen.prefix import checked_prefix, with_prefix
-from qpmpc.codegen.rows_solvers import rows_files
+from qpmpc.codegen.rows.solver_c import rows_files
 from qpmpc.codegen.values import CONSTANTS, Values
 from qpmpc.errors import InputError
 from qpmpc.files import check_folder, write_text
 
 Precision = Literal["f32", "f64"]
 Target = Literal["host", "cortex-m7"]
-Solver = Literal["admm", "osqp"]
+Algorithm = Literal["admm", "osqp"]
 PRECISIONS: tuple[Precision, ...] = ("f32", "f64")
 TARGETS: tuple[Target, ...] = ("host", "cortex-m7")
-SOLVERS: tuple[Solver, ...] = ("admm", "osqp")
-# Flash and RAM of the firmware: what does not fit does not link. For the solver written for this
+ALGORITHMS: tuple[Algorithm, ...] = ("admm", "osqp")
+# Flash and RAM of the firmware: what does not fit does not link. For the algorithm written for this
 # problem the project's budget; OSQP takes more, see docs/embedded.md.
-MEMORY_KB: dict[tuple[Solver, Precision], tuple[int, int]] = {
+MEMORY_KB: dict[tuple[Algorithm, Precision], tuple[int, int]] = {
     ("admm", "f32"): (128, 96),
     ("admm", "f64"): (128, 96),
     ("osqp", "f32"): (256, 256),
@@ -49,7 +49,7 @@ def generate(
     folder: Path,
     target: Target = "host",
     precision: Precision = "f32",
-    solver: Solver = "admm",
+    algorithm: Algorithm = "admm",
     prefix: str = "",
 ) -> list[Path]:
     """Write the C project of a controller; same input, same bytes.
@@ -60,7 +60,7 @@ def generate(
     folder : of the project; files of the same names are replaced, others left alone
     target : `host` (shared library) or `cortex-m7` (bare metal, for QEMU's mps2-an500)
     precision : of all arithmetic
-    solver : `admm`, written for this problem, or `osqp`, OSQP's own embedded code
+    algorithm : `admm`, written for this problem, or `osqp`, OSQP's own embedded code
     prefix : before every name that begins with mpc_, see `with_prefix`
 
     Returns
@@ -70,11 +70,11 @@ def generate(
     Raises
     ------
     InputError
-        If target, precision or solver is unknown, the prefix cannot begin a name in C or the
+        If target, precision or algorithm is unknown, the prefix cannot begin a name in C or the
         folder cannot be written to.
     """
     check_folder(folder, "output folder")
-    files = project_files(values, target, precision, solver, prefix)
+    files = project_files(values, target, precision, algorithm, prefix)
     for name, text in files.items():
         write_text(folder / name, text)
     return [folder / name for name in files]
@@ -84,7 +84,7 @@ def project_files(
     values: Values,
     target: Target = "host",
     precision: Precision = "f32",
-    solver: Solver = "admm",
+    algorithm: Algorithm = "admm",
     prefix: str = "",
 ) -> dict[str, str]:
     """Return the text of every file of the project, by name.
@@ -92,17 +92,17 @@ def project_files(
     Raises
     ------
     InputError
-        If target, precision or solver is unknown or the prefix cannot begin a name in C.
+        If target, precision or algorithm is unknown or the prefix cannot begin a name in C.
     """
     one_of(target, TARGETS, "target")
     one_of(precision, PRECISIONS, "precision")
-    one_of(solver, SOLVERS, "solver")
+    one_of(algorithm, ALGORITHMS, "algorithm")
     checked_prefix(prefix)
     root = resources.files("qpmpc.codegen")
     files = {p.name: p.read_text("utf-8") for p in _sorted(root / "runtime")}
-    files |= rows_files(values.scalars, solver)
+    files |= rows_files(values.scalars, algorithm)
     of_osqp: dict[str, str] = {}
-    if solver == "osqp":
+    if algorithm == "osqp":
         del files["mpc_admm.c"], files["mpc_admm.h"]
         files |= {p.name: p.read_text("utf-8") for p in _sorted(root / "osqp_adapter")}
         of_osqp = osqp_files(values, precision)
@@ -115,7 +115,7 @@ def project_files(
         trim_blocks=False,
         autoescape=False,
     )
-    context = _context(values, target, precision, solver)
+    context = _context(values, target, precision, algorithm)
     templates = {
         "mpc_config.h": "mpc_config.h.j2",
         "mpc_constants.h": "mpc_constants.h.j2",
@@ -158,7 +158,7 @@ def _count_or(literal: Callable[[float], str], value: float) -> str:
 
 
 def _context(
-    values: Values, target: Target, precision: Precision, solver: Solver
+    values: Values, target: Target, precision: Precision, algorithm: Algorithm
 ) -> dict[str, Any]:
     def literal(number: float) -> str:
         if precision == "f32":
@@ -178,10 +178,10 @@ def _context(
         "version": __version__,
         "target": target,
         "precision": precision,
-        "solver": solver,
+        "algorithm": algorithm,
         "osqp_version": osqp_version(),
         "constant_arrays": [f"{PREFIX}{name}" for name in CONSTANT_ARRAYS],
-        "memory_kb": MEMORY_KB[solver, precision],
+        "memory_kb": MEMORY_KB[algorithm, precision],
         "values": values,
         "sizes": values.sizes,
         "constants": [

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from qpmpc.codegen.examples import is_example
-from qpmpc.codegen.generate import Precision, Solver, project_files
+from qpmpc.codegen.generate import Algorithm, Precision, project_files
 from qpmpc.codegen.values import Values
 from qpmpc.errors import QpmpcError
 from qpmpc.files import write_text
@@ -130,7 +130,7 @@ class HostLibrary:
 
 
 def build_host_library(
-    values: Values, precision: Precision = "f64", solver: Solver = "admm"
+    values: Values, precision: Precision = "f64", algorithm: Algorithm = "admm"
 ) -> HostLibrary:
     """Generate, compile and load a controller.
 
@@ -139,7 +139,7 @@ def build_host_library(
     CodegenError
         If there is no compiler, or it fails.
     """
-    files = project_files(values, "host", precision, solver)
+    files = project_files(values, "host", precision, algorithm)
     return HostLibrary(compiled(files), values, precision)
 
 

@@ -17,7 +17,7 @@ def codegen(
         typer.Option(metavar="TARGET", help="host (shared library) or cortex-m7 (firmware)."),
     ] = "host",
     precision: Annotated[str, typer.Option(metavar="f32|f64", help="Of all arithmetic.")] = "f32",
-    solver: Annotated[
+    algorithm: Annotated[
         str,
         typer.Option(
             metavar="admm|osqp",
@@ -28,7 +28,7 @@ def codegen(
     iterations: Annotated[
         int | None,
         typer.Option(
-            metavar="K", help="Solver iterations a step; as the controller's.", show_default=False
+            metavar="K", help="Solver iterations per step; as the controller's.", show_default=False
         ),
     ] = None,
     prefix: Annotated[
@@ -51,29 +51,29 @@ def codegen(
 
       qpmpc codegen firmware --target cortex-m7 --precision f32 --iterations 25
 
-      qpmpc codegen with_osqp --solver osqp --precision f64
+      qpmpc codegen with_osqp --algorithm osqp --precision f64
 
       qpmpc codegen prius_c --vehicle prius-liion --prefix liion_
     """
     from qpmpc.cli.console import result_console
     from qpmpc.cli.inputs import load_vehicle_and_settings
-    from qpmpc.codegen.generate import PRECISIONS, SOLVERS, TARGETS, generate, one_of
+    from qpmpc.codegen.generate import ALGORITHMS, PRECISIONS, TARGETS, generate, one_of
     from qpmpc.codegen.prefix import checked_prefix
     from qpmpc.codegen.values import values_of
 
     of_target = one_of(target, TARGETS, "target")
     of_precision = one_of(precision, PRECISIONS, "precision")
-    of_solver = one_of(solver, SOLVERS, "solver")
+    of_algorithm = one_of(algorithm, ALGORITHMS, "algorithm")
     checked_prefix(prefix)
     overrides = list(set_ or [])
     if iterations is not None:
         overrides.append(f"mh_qp.admm.iterations={iterations}")
     car, settings = load_vehicle_and_settings(vehicle, overrides)
     values = values_of(car, settings.mh_qp, settings.rule_based)
-    files = generate(values, folder, of_target, of_precision, of_solver, prefix)
+    files = generate(values, folder, of_target, of_precision, of_algorithm, prefix)
     sizes = values.sizes
     result_console().print(
-        f"{folder}: {len(files)} files written, target {target}, {precision}, solver {solver}, "
+        f"{folder}: {len(files)} files written, target {target}, {precision}, {algorithm}, "
         f"{sizes.stages} stages, {values.iterations} iterations a step; start with README.md",
         markup=False,
     )

@@ -8,7 +8,7 @@ import typer
 from qpmpc.cli.options import CycleArgument, JsonOption, OutOption, SetOption, VehicleOption
 
 if TYPE_CHECKING:
-    from qpmpc.codegen.generate import Precision, Solver
+    from qpmpc.codegen.generate import Algorithm, Precision
     from qpmpc.controllers.settings import ControllerSettings
     from qpmpc.trip import Trip
 
@@ -22,7 +22,7 @@ def pil(
             metavar="f32|f64", help="Of all arithmetic; f32 if not named.", show_default=False
         ),
     ] = None,
-    solver: Annotated[
+    algorithm: Annotated[
         str | None,
         typer.Option(
             metavar="admm|osqp", help="Of the firmware; admm if not named.", show_default=False
@@ -32,7 +32,7 @@ def pil(
         bool,
         typer.Option(
             "--pareto",
-            help="K = 10, 25, 50, 100 with both precisions and solvers, or those named: "
+            help="K = 10, 25, 50, 100 with both precisions and algorithms, or those named: "
             "instructions and memory against fuel above DP.",
         ),
     ] = False,
@@ -57,13 +57,13 @@ def pil(
     """
     from qpmpc.cli.inputs import check_outputs, load_vehicle_and_settings
     from qpmpc.codegen.firmware import require_tools
-    from qpmpc.codegen.generate import PRECISIONS, SOLVERS, one_of
+    from qpmpc.codegen.generate import ALGORITHMS, PRECISIONS, one_of
     from qpmpc.registry import check_controllers
     from qpmpc.trip import Trip
 
     one_of(target, ("cortex-m7",), "target")
     precisions = PRECISIONS if precision is None else (one_of(precision, PRECISIONS, "precision"),)
-    solvers = SOLVERS if solver is None else (one_of(solver, SOLVERS, "solver"),)
+    algorithms = ALGORITHMS if algorithm is None else (one_of(algorithm, ALGORITHMS, "algorithm"),)
     car, settings = load_vehicle_and_settings(vehicle, set_)
     trip = Trip(cycle, car)
     check_outputs(json_file, out)
@@ -71,26 +71,26 @@ def pil(
         check_controllers(["dp"])
     require_tools()
     if pareto:
-        _pareto(trip, settings, precisions, solvers, json_file, out)
+        _pareto(trip, settings, precisions, algorithms, json_file, out)
     else:
-        _one_run(trip, settings, precisions[0], solvers[0], json_file, out)
+        _one_run(trip, settings, precisions[0], algorithms[0], json_file, out)
 
 
 def _one_run(
     trip: "Trip",
     settings: "ControllerSettings",
     precision: "Precision",
-    solver: "Solver",
+    algorithm: "Algorithm",
     json_file: Path | None,
     out: Path | None,
 ) -> None:
     from qpmpc.cli.console import progress_bar, result_console, write_json
-    from qpmpc.codegen.pil import processor_in_the_loop
-    from qpmpc.codegen.pil_report import pil_lines, write_pil
+    from qpmpc.codegen.pil.loop import processor_in_the_loop
+    from qpmpc.codegen.pil.report import pil_lines, write_pil
 
     with progress_bar(1) as bar:
-        report = bar.next_job(f"{trip.cycle.name}, firmware {solver} {precision}")
-        result = processor_in_the_loop(trip, settings, precision, report, solver)
+        report = bar.next_job(f"{trip.cycle.name}, firmware {algorithm} {precision}")
+        result = processor_in_the_loop(trip, settings, precision, report, algorithm)
     write_json(result.summary(), json_file)
     console = result_console(json_file)
     for line in pil_lines(result):
@@ -104,16 +104,16 @@ def _pareto(
     trip: "Trip",
     settings: "ControllerSettings",
     precisions: "tuple[Precision, ...]",
-    solvers: "tuple[Solver, ...]",
+    algorithms: "tuple[Algorithm, ...]",
     json_file: Path | None,
     out: Path | None,
 ) -> None:
     from qpmpc.cli.console import progress_bar, result_console, write_json
-    from qpmpc.codegen.pareto import ITERATIONS, embedded_pareto, job_count
-    from qpmpc.codegen.pil_report import pareto_table, write_pareto
+    from qpmpc.codegen.pil.pareto import ITERATIONS, embedded_pareto, job_count
+    from qpmpc.codegen.pil.report import pareto_table, write_pareto
 
-    with progress_bar(job_count(precisions, solvers, ITERATIONS)) as bar:
-        found = embedded_pareto(trip, settings, precisions, solvers, bar.next_job)
+    with progress_bar(job_count(precisions, algorithms, ITERATIONS)) as bar:
+        found = embedded_pareto(trip, settings, precisions, algorithms, bar.next_job)
     write_json(found.as_data(), json_file)
     console = result_console(json_file)
     console.print(pareto_table(found.rows()))

@@ -1,7 +1,7 @@
 """The one table of the QP: variables, the quantities its rows are made of, rows and cost.
 
 Everything else is made from it: the values in numpy (`StageQp`), the sparsity pattern, the C code
-and OSQP's order of columns (`qpmpc.codegen.rows_c`), and the table in the docs. A row is an
+and OSQP's order of columns (`qpmpc.codegen.rows.stage_c`), and the table in the docs. A row is an
 equation in the variables of a stage; `soc_before` is `soc` of the stage before, for the first
 stage the state now. What its coefficients are made of are numbers of `qp_parameters`, the stage
 (`Stages`), the point it is expanded about (`Linearisation`), the pieces of the PWA curves, the

@@ -1,8 +1,8 @@
 """Heat that leaves the coolant, paper eq. (3): the one text for plant, QP, generated C and DP.
 
 Each function is one expression in the subset of `qpmpc.qp.expressions`, so that it can be rendered
-in other arithmetic (`in_arithmetic`) and in C (`qpmpc.codegen.c_text`). Whatever has the fields of
-`Thermal` can be `th`.
+in other arithmetic (`in_arithmetic`) and in C (`qpmpc.codegen.rows.c_text`). Whatever has the
+fields of `Thermal` can be `th`.
 """
 
 from collections.abc import Callable

@@ -25,7 +25,7 @@ def test_default_is_a_host_project_that_builds(cli, tmp_path):
     settings = MhQpSettings()
     stages = settings.horizon.short_stages + settings.horizon.blocks * settings.horizon.classes
     assert done.out == (
-        f"{folder}: {len(names)} files written, target host, f32, solver admm, {stages} stages, "
+        f"{folder}: {len(names)} files written, target host, f32, admm, {stages} stages, "
         f"{settings.admm.iterations} iterations a step; start with README.md\n"
     )
     assert {"README.md", "NOTICE", "Makefile", "mpc.h", "mpc_admm.c", "mpc_data.c"} <= set(names)
@@ -42,22 +42,22 @@ def test_default_is_a_host_project_that_builds(cli, tmp_path):
 
 @pytest.mark.parametrize("target", ["host", "cortex-m7"])
 @pytest.mark.parametrize("precision", ["f32", "f64"])
-@pytest.mark.parametrize("solver", ["admm", "osqp"])
-def test_every_combination_is_written_and_named(cli, tmp_path, target, precision, solver):
-    options = ("--target", target, "--precision", precision, "--solver", solver)
+@pytest.mark.parametrize("algorithm", ["admm", "osqp"])
+def test_every_combination_is_written_and_named(cli, tmp_path, target, precision, algorithm):
+    options = ("--target", target, "--precision", precision, "--algorithm", algorithm)
     done = cli("codegen", tmp_path, *options, "--iterations", "33")
     assert (done.code, done.err) == (0, "")
-    assert f"target {target}, {precision}, solver {solver}" in done.out
+    assert f"target {target}, {precision}, {algorithm}" in done.out
     config = (tmp_path / "mpc_config.h").read_text()
     assert "#define MPC_ITERATIONS 33 " in config
     assert f"#define MPC_F32 {int(precision == 'f32')}" in config
-    assert f"#define MPC_SOLVER_OSQP {int(solver == 'osqp')}" in config
-    assert (tmp_path / "mpc_osqp.c").exists() == (solver == "osqp")
-    assert (tmp_path / "osqp" / "LICENSE").exists() == (solver == "osqp")
+    assert f"#define MPC_SOLVER_OSQP {int(algorithm == 'osqp')}" in config
+    assert (tmp_path / "mpc_osqp.c").exists() == (algorithm == "osqp")
+    assert (tmp_path / "osqp" / "LICENSE").exists() == (algorithm == "osqp")
     assert (tmp_path / "cortex_m7.ld").exists() == (target == "cortex-m7")
     readme = (tmp_path / "README.md").read_text()
     assert f"target `{target}`" in readme
-    assert f"solver `{solver}`" in readme
+    assert f"algorithm `{algorithm}`" in readme
 
 
 def test_vehicle_and_settings_reach_the_code(cli, tmp_path):
@@ -90,7 +90,7 @@ def test_writing_again_replaces_its_files_and_leaves_others_alone(cli, tmp_path)
         (["out", "--nonsense"], ["--nonsense"]),
         (["out", "--target", "z80"], ["z80", "host", "cortex-m7"]),
         (["out", "--precision", "f16"], ["f16", "f32", "f64"]),
-        (["out", "--solver", "qpoases"], ["qpoases", "admm", "osqp"]),
+        (["out", "--algorithm", "qpoases"], ["qpoases", "admm", "osqp"]),
         (["out", "--iterations", "0"], ["iterations"]),
         (["out", "--iterations", "many"], ["--iterations", "integer"]),
         (["out", "--vehicle", "beetle"], ["beetle", "prius-nimh"]),
@@ -99,7 +99,7 @@ def test_writing_again_replaces_its_files_and_leaves_others_alone(cli, tmp_path)
         (["out", "--set", "mh_qp.horizon.blocks=0"], ["mh_qp.horizon.blocks"]),
         (["out", "--set", "mh_qp.qp.terminal_high=1"], ["terminal_high"]),
         (
-            ["out", "--solver", "osqp", "--set", "mh_qp.admm.proximal_weight=1.2345678e-18"],
+            ["out", "--algorithm", "osqp", "--set", "mh_qp.admm.proximal_weight=1.2345678e-18"],
             ["proximal_weight"],
         ),
         (["out", "--prefix", "2nd_"], ["2nd_", "letter"]),
@@ -124,8 +124,8 @@ def test_folder_without_permission(cli, tmp_path):
     assert "permission" in done.err
 
 
-@pytest.mark.parametrize("solver", ["admm", "osqp"])
-def test_the_dependencies_of_the_core_suffice(tmp_path, solver):
+@pytest.mark.parametrize("algorithm", ["admm", "osqp"])
+def test_the_dependencies_of_the_core_suffice(tmp_path, algorithm):
     script = (
         "import sys\n"
         f"missing = {EXTRAS!r}\n"
@@ -135,7 +135,7 @@ def test_the_dependencies_of_the_core_suffice(tmp_path, solver):
         "            raise ModuleNotFoundError(f'No module named {name!r}', name=name)\n"
         "sys.meta_path.insert(0, Missing())\n"
         "from qpmpc.cli import main\n"
-        f"main(['codegen', {str(tmp_path)!r}, '--solver', {solver!r}])\n"
+        f"main(['codegen', {str(tmp_path)!r}, '--algorithm', {algorithm!r}])\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")

@@ -9,7 +9,7 @@ import pytest
 import qpmpc.codegen.pil as loop
 from qpmpc.codegen import firmware
 from qpmpc.codegen.firmware import missing_tools
-from qpmpc.codegen.pareto import ITERATIONS
+from qpmpc.codegen.pil.pareto import ITERATIONS
 
 MISSING = missing_tools()
 needs_tools = pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}")
@@ -21,7 +21,7 @@ def test_one_run_is_reported_and_written(cli, trip, tmp_path):
     out = tmp_path / "out"
     done = cli("pil", trip, *QUICK, "--out", out)
     assert (done.code, done.err) == (0, "")
-    assert "48 steps on cortex-m7, f32, solver admm, 50 iterations" in done.out
+    assert "48 steps on cortex-m7, f32, algorithm admm, 50 iterations" in done.out
     for word in ("instructions a step", "estimated", "flash", "fuel", "violations", "command"):
         assert word in done.out
     assert {p.name for p in out.iterdir()} == {
@@ -38,19 +38,19 @@ def test_one_run_is_reported_and_written(cli, trip, tmp_path):
 
 @needs_tools
 def test_json_on_stdout_is_nothing_but_json(cli, trip, strict_json):
-    options = ("--solver", "osqp", "--precision", "f64", "--json", "-")
+    options = ("--algorithm", "osqp", "--precision", "f64", "--json", "-")
     done = cli("pil", trip, *QUICK, *options)
     assert done.code == 0
     data = strict_json(done.out)
-    assert (data["solver"], data["precision"], data["steps"]) == ("osqp", "f64", 48)
+    assert (data["algorithm"], data["precision"], data["steps"]) == ("osqp", "f64", 48)
     assert abs(data["fuel_difference_percent"]) < 0.1
-    assert "solver osqp" in done.err
+    assert "algorithm osqp" in done.err
 
 
 @needs_tools
 def test_pareto_has_every_iteration_count_beside_the_optimum(cli, trip, tmp_path, strict_json):
     pytest.importorskip("numba", reason="not installed: numba, for dynamic programming")
-    named = ("--precision", "f32", "--solver", "admm")
+    named = ("--precision", "f32", "--algorithm", "admm")
     done = cli("pil", trip, *QUICK, *named, "--pareto", "--out", tmp_path, "--json", "-")
     assert done.code == 0
     data = strict_json(done.out)
@@ -90,7 +90,7 @@ def no_run(monkeypatch):
         raise AssertionError("bad input must be found before any run")
 
     monkeypatch.setattr(loop, "processor_in_the_loop", run)
-    monkeypatch.setattr("qpmpc.codegen.pareto.processor_in_the_loop", run)
+    monkeypatch.setattr("qpmpc.codegen.pil.pareto.processor_in_the_loop", run)
 
 
 @pytest.mark.parametrize(
@@ -102,8 +102,8 @@ def no_run(monkeypatch):
         (["nycc", "extra"], ["extra"]),
         (["nycc", "--target", "host"], ["host", "cortex-m7"]),
         (["nycc", "--precision", "f16"], ["f16", "f32", "f64"]),
-        (["nycc", "--solver", "qpoases"], ["qpoases", "admm", "osqp"]),
-        (["nycc", "--pareto", "--solver", "qpoases"], ["qpoases", "admm", "osqp"]),
+        (["nycc", "--algorithm", "qpoases"], ["qpoases", "admm", "osqp"]),
+        (["nycc", "--pareto", "--algorithm", "qpoases"], ["qpoases", "admm", "osqp"]),
         (["nycc", "--pareto=3"], ["--pareto"]),
         (["nycc", "--vehicle", "beetle"], ["beetle", "prius-nimh"]),
         (["nycc", "--set", "x"], ["KEY=VALUE"]),

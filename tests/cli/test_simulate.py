@@ -19,10 +19,10 @@ INNER_KEYS = {
 }
 
 
-SOLVERS = {"mh-qp": "admm f64", "mh-qp-paper": "osqp", "mh-nlp": "ipopt", "rule-based": None}
+ALGORITHMS = {"mh-qp": "admm f64", "mh-qp-paper": "osqp", "mh-nlp": "ipopt", "rule-based": None}
 
 
-@pytest.mark.parametrize("controller", SOLVERS)
+@pytest.mark.parametrize("controller", ALGORITHMS)
 def test_json_has_the_keys_of_the_contract(cli, strict_json, trip, controller):
     done = cli("simulate", trip, "--controller", controller, "--json", "-")
     assert done.code == 0
@@ -32,7 +32,7 @@ def test_json_has_the_keys_of_the_contract(cli, strict_json, trip, controller):
         assert set(run[key]) == inner
     assert run["controller"] == controller
     assert run["cycle"] == "short"
-    assert run["solver"]["name"] == SOLVERS[controller]
+    assert run["solver"]["name"] == ALGORITHMS[controller]
     assert run["solver"]["implementation"] == ("c" if controller == "mh-qp" else "python")
     assert run["remarks"] == []
 

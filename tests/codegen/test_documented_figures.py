@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from qpmpc.codegen.firmware import missing_tools
-from qpmpc.codegen.generate import PRECISIONS, SOLVERS, Precision, Solver
-from qpmpc.codegen.pareto import ITERATIONS
-from qpmpc.codegen.pil import CLOCKS_MHZ, CYCLES_AN_INSTRUCTION, processor_in_the_loop
+from qpmpc.codegen.generate import ALGORITHMS, PRECISIONS, Algorithm, Precision
+from qpmpc.codegen.pil.loop import CLOCKS_MHZ, CYCLES_AN_INSTRUCTION, processor_in_the_loop
+from qpmpc.codegen.pil.pareto import ITERATIONS
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.trip import Trip
@@ -37,7 +37,7 @@ def rows_of(text: str, columns: int) -> list[list[str]]:
 
 @cache
 def measured(
-    solver: Solver, precision: Precision, iterations: int, blocks: int = 0
+    algorithm: Algorithm, precision: Precision, iterations: int, blocks: int = 0
 ) -> dict[str, float]:
     """Instructions a step, flash and RAM of a few steps without departure."""
     overrides: dict[str, object] = {
@@ -49,7 +49,7 @@ def measured(
     whole = load_cycle("nycc")
     trip = Cycle.from_samples("start", whole.time_s[: STEPS + 1], whole.speed_mps[: STEPS + 1])
     settings = ControllerSettings().with_settings(overrides)
-    result = processor_in_the_loop(Trip(trip), settings, precision, solver=solver)
+    result = processor_in_the_loop(Trip(trip), settings, precision, algorithm=algorithm)
     return {
         "instructions": float(np.median(result.instructions)),
         "flash": float(result.footprint.flash),
@@ -59,28 +59,28 @@ def measured(
 
 
 def table() -> dict[tuple[str, str, int], list[float]]:
-    """Instructions, flash and RAM of the table of docs/embedded.md, by solver, precision, K."""
+    """Instructions, flash and RAM of the table of docs/embedded.md, by algorithm, precision, K."""
     found = {}
     for row in rows_of(EMBEDDED, 8):
-        if row[0] in SOLVERS:
+        if row[0] in ALGORITHMS:
             key = row[0], row[1], int(row[2].split()[0])
             found[key] = [float(row[i]) for i in (3, 5, 6)]
     return found
 
 
 def test_the_table_has_every_combination() -> None:
-    expected = {(s, p, k) for s in SOLVERS for p in PRECISIONS for k in ITERATIONS}
+    expected = {(s, p, k) for s in ALGORITHMS for p in PRECISIONS for k in ITERATIONS}
     assert set(table()) == expected
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
 @pytest.mark.parametrize("precision", PRECISIONS)
-def test_instructions_flash_and_ram_are_as_documented(solver, precision) -> None:
+def test_instructions_flash_and_ram_are_as_documented(algorithm, precision) -> None:
     """Least and most iterations are measured; between them instructions grow by the same."""
-    least, most = (measured(solver, precision, k) for k in (ITERATIONS[0], ITERATIONS[-1]))
+    least, most = (measured(algorithm, precision, k) for k in (ITERATIONS[0], ITERATIONS[-1]))
     growth = (most["instructions"] - least["instructions"]) / (ITERATIONS[-1] - ITERATIONS[0])
     for k in ITERATIONS:
-        instructions, flash, ram = table()[solver, precision, k]
+        instructions, flash, ram = table()[algorithm, precision, k]
         expected = least["instructions"] + growth * (k - ITERATIONS[0])
         assert instructions == pytest.approx(expected, rel=TOLERANCE)
         assert flash == pytest.approx(least["flash"], rel=TOLERANCE)

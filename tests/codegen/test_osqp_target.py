@@ -15,7 +15,7 @@ from qpmpc.codegen.firmware import (
 )
 from qpmpc.codegen.generate import MEMORY_KB, generate
 from qpmpc.codegen.host_library import CodegenError
-from qpmpc.codegen.pil import PilResult, processor_in_the_loop
+from qpmpc.codegen.pil.loop import PilResult, processor_in_the_loop
 from qpmpc.codegen.values import values_of
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
@@ -73,7 +73,7 @@ def short_trip(steps: int) -> Cycle:
 def result(request) -> PilResult:
     settings = SETTINGS.with_settings({"mh_qp.admm.cold_iterations": 2000})
     trip = Trip(short_trip(150), CAR)
-    return processor_in_the_loop(trip, settings, precision=request.param, solver="osqp")
+    return processor_in_the_loop(trip, settings, precision=request.param, algorithm="osqp")
 
 
 def test_commands_are_those_of_osqp_in_python(result) -> None:

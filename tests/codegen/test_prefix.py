@@ -10,7 +10,14 @@ import pytest
 
 from qpmpc.codegen.controller import InputBuilder
 from qpmpc.codegen.firmware import make_firmware, missing_tools, symbols
-from qpmpc.codegen.generate import PRECISIONS, SOLVERS, Precision, Solver, generate, project_files
+from qpmpc.codegen.generate import (
+    ALGORITHMS,
+    PRECISIONS,
+    Algorithm,
+    Precision,
+    generate,
+    project_files,
+)
 from qpmpc.codegen.host_library import FLAGS, HostLibrary, build_host_library
 from qpmpc.codegen.prefix import with_prefix
 from qpmpc.codegen.values import Values, values_of
@@ -51,30 +58,30 @@ def external(folder: Path, *files: str) -> set[str]:
 # --- names ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
 @pytest.mark.parametrize("precision", PRECISIONS)
-def test_every_external_name_begins_with_mpc(tmp_path, precision, solver) -> None:
+def test_every_external_name_begins_with_mpc(tmp_path, precision, algorithm) -> None:
     """OSQP's functions keep their names; its workspace, which is ours, does not."""
     need("gcc", "nm")
-    generate(numbers(), tmp_path, "host", precision, solver)
+    generate(numbers(), tmp_path, "host", precision, algorithm)
     ours = [p.name for p in tmp_path.glob("mpc*.c")]
     include = ["-Iosqp", "-Iosqp/inc/public", "-Iosqp/inc/private"]
-    if solver == "osqp":
+    if algorithm == "osqp":
         ours.append("osqp/mpc_osqp_workspace.c")
     run(tmp_path, "gcc", "-std=c99", "-c", *include, *ours)
     names = external(tmp_path, *(p.name for p in tmp_path.glob("*.o")))
     assert {"mpc_step", "mpc_forecast_start", "mpc_par"} <= names
     assert [name for name in names if not name.startswith("mpc_")] == []
     # with a prefix of 8 characters they differ within the 31 that C99 promises to keep apart
-    if solver == "admm":
+    if algorithm == "admm":
         assert len({name[: 31 - 8] for name in names}) == len(names)
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
-def test_public_headers_declare_and_define_nothing_without_mpc(tmp_path, solver) -> None:
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_public_headers_declare_and_define_nothing_without_mpc(tmp_path, algorithm) -> None:
     """Macros by the preprocessor; types, enumerators and functions from what it leaves."""
     need("gcc")
-    generate(numbers(), tmp_path, "host", "f32", solver)
+    generate(numbers(), tmp_path, "host", "f32", algorithm)
     headers = [f"mpc{n}.h" for n in ("", "_config", "_state", "_forecast", "_parts", "_model")]
     everything = "".join(f'#include "{name}"\n' for name in headers)
     (tmp_path / "all.c").write_text("#include <stdint.h>\n" + everything)
@@ -102,15 +109,15 @@ def test_public_headers_declare_and_define_nothing_without_mpc(tmp_path, solver)
     assert [name for name in names if not name.lower().startswith("mpc_")] == []
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
 @pytest.mark.parametrize("target", ["host", "cortex-m7"])
-def test_a_prefix_leaves_no_name_without(target, solver) -> None:
-    files = project_files(numbers(), target, "f32", solver, prefix="liion_")
+def test_a_prefix_leaves_no_name_without(target, algorithm) -> None:
+    files = project_files(numbers(), target, "f32", algorithm, prefix="liion_")
     for name, text in files.items():
         if not name.startswith(("osqp/src/", "osqp/inc/", "osqp/LICENSE")):
             assert not re.search(r"(\b|-D)(mpc_|MPC_|mpc\.h|libmpc)", name + text), name
     assert "liion_mpc.h" in files
-    plain = project_files(numbers(), target, "f32", solver)
+    plain = project_files(numbers(), target, "f32", algorithm)
     without = {re.sub(r"liion_|LIION_", "", n): t for n, t in files.items()}
     assert {n: re.sub(r"liion_|LIION_", "", t) for n, t in without.items()} == plain
 
@@ -130,10 +137,10 @@ def test_what_cannot_begin_a_name_is_refused(tmp_path, prefix) -> None:
 # --- projects ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
-def test_a_prefixed_project_builds_by_its_makefile_with_its_example(tmp_path, solver) -> None:
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_a_prefixed_project_builds_by_its_makefile_with_its_example(tmp_path, algorithm) -> None:
     need("make", "cc")
-    generate(numbers(), tmp_path, "host", "f64", solver, "P2_")
+    generate(numbers(), tmp_path, "host", "f64", algorithm, "P2_")
     run(tmp_path, "make", "-s", "libP2_mpc.so", "example")
     library = HostLibrary(tmp_path / "libP2_mpc.so", numbers(), "f64", "P2_")
     assert library.state_bytes > 0
@@ -193,12 +200,14 @@ int main(void)
 """
 
 
-def recorded(vehicle: str, precision: Precision, solver: Solver = "admm") -> tuple[bytes, bytes]:
+def recorded(
+    vehicle: str, precision: Precision, algorithm: Algorithm = "admm"
+) -> tuple[bytes, bytes]:
     """Inputs of the first seconds of NYCC and what the library without a prefix makes of them."""
     car, cycle = load_vehicle(vehicle), load_cycle("nycc")
     trace = Trace.of(cycle, car)
     drove = simulate(cycle, "rule-based", car).trajectory
-    library = build_host_library(numbers(vehicle), precision, solver)
+    library = build_host_library(numbers(vehicle), precision, algorithm)
     inputs = InputBuilder(StageBuilder(car, trace, trace, SETTINGS.mh_qp.horizon), trace)
     state = ctypes.create_string_buffer(library.state_bytes)
     into, out = library.input_type(), library.output_type()

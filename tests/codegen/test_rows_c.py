@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qpmpc.codegen.c_text import Writer
-from qpmpc.codegen.elimination import Elimination
 from qpmpc.codegen.generate import project_files
 from qpmpc.codegen.host_library import compiled, compiler
-from qpmpc.codegen.rows_c import FUNCTIONS, types_h, values_h
+from qpmpc.codegen.rows.c_text import Writer
+from qpmpc.codegen.rows.elimination import Elimination
+from qpmpc.codegen.rows.stage_c import FUNCTIONS, types_h, values_h
 from qpmpc.codegen.values import values_of
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.qp.expressions import FormulaError, code_of, expression
@@ -111,7 +111,7 @@ def test_the_factor_has_every_entry_that_elimination_makes(seed, stages) -> None
 def test_a_new_variable_and_row_need_no_edit_of_the_factor(monkeypatch) -> None:
     """A row more, with entries that no other has: its place in the factor is found."""
     row = Row("extra", "internal + soc_before - 2.0 * t_slack <= 5.0")
-    monkeypatch.setattr("qpmpc.codegen.elimination.ROWS", (*ROWS, row))
+    monkeypatch.setattr("qpmpc.codegen.rows.elimination.ROWS", (*ROWS, row))
     e = Elimination()
     slack, internal = Entry(Var.T_SLACK, False), Entry(Var.INTERNAL, False)
     assert e.pair(slack, internal) in {e.pair(*pair) for pair in e.factors(before=False)}

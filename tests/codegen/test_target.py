@@ -15,8 +15,8 @@ from qpmpc.codegen.firmware import (
     missing_tools,
     symbols,
 )
-from qpmpc.codegen.pil import PilResult, processor_in_the_loop
-from qpmpc.codegen.pil_report import pil_lines, write_pil
+from qpmpc.codegen.pil.loop import PilResult, processor_in_the_loop
+from qpmpc.codegen.pil.report import pil_lines, write_pil
 from qpmpc.codegen.values import values_of
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle

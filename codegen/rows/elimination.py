@@ -7,7 +7,7 @@ rows: a new variable or entry needs no edit.
 from collections.abc import Iterable, Iterator
 from itertools import combinations_with_replacement, permutations
 
-from qpmpc.codegen.rows_c import function, is_unit, member, of_pieces, struct, variable
+from qpmpc.codegen.rows.stage_c import function, is_unit, member, of_pieces, struct, variable
 from qpmpc.qp.rows import ROWS, Entry, Row, Var, states
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from qpmpc.codegen.c_text import Writer, wrapped
+from qpmpc.codegen.rows.c_text import Writer, wrapped
 from qpmpc.qp import rows
 from qpmpc.qp.coolant import radiator_w_per_k, thermostat_step
 from qpmpc.qp.expressions import is_number, names_in, parsed, targets_of

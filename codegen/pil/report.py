@@ -11,8 +11,8 @@ from jinja2 import Environment, StrictUndefined
 from rich.table import Table
 
 from qpmpc.codegen.controller import FLAGS
-from qpmpc.codegen.pareto import Pareto
-from qpmpc.codegen.pil import PilResult
+from qpmpc.codegen.pil.loop import PilResult
+from qpmpc.codegen.pil.pareto import Pareto
 from qpmpc.files import json_text, write_bytes, write_text
 from qpmpc.report.columns import violations_text
 from qpmpc.report.provenance import provenance
@@ -31,7 +31,7 @@ def pil_lines(result: PilResult) -> list[str]:
     counts, departure = data["instructions"], data["departure"]
     lines = [
         f"{data['cycle']}: {data['steps']} steps on {data['target']}, {data['precision']}, "
-        f"solver {data['solver']}, {data['iterations']} iterations a step, "
+        f"algorithm {data['algorithm']}, {data['iterations']} iterations a step, "
         f"{data['steps_per_s']:.0f} steps/s here",
         f"instructions a step  {counts['median']:,} median, {counts['min']:,}..{counts['max']:,} "
         f"(spread {counts['spread_percent']:.3f} %)",
@@ -69,13 +69,13 @@ def pil_lines(result: PilResult) -> list[str]:
 
 def write_pil(result: PilResult, folder: Path) -> list[str]:
     """Write steps, figures and, with matplotlib, picture and report; returns remarks."""
-    solver = "" if result.solver == "admm" else f"_{result.solver}"
-    stem = f"pil_{result.run.cycle}_{result.precision}{solver}"
+    algorithm = "" if result.algorithm == "admm" else f"_{result.algorithm}"
+    stem = f"pil_{result.run.cycle}_{result.precision}{algorithm}"
     write_text(folder / f"{stem}.csv", _csv(result))
     write_text(folder / f"{stem}.json", json_text(result.summary()))
     if find_spec("matplotlib") is None:
         return [f"{folder / stem}.csv, .json written; {NO_MATPLOTLIB}"]
-    from qpmpc.codegen.pil_pictures import draw_pil
+    from qpmpc.codegen.pil.pictures import draw_pil
 
     picture = draw_pil(result)
     write_bytes(folder / f"{stem}.png", picture)
@@ -93,7 +93,7 @@ def write_pareto(pareto: Pareto, folder: Path) -> list[str]:
     write_text(folder / f"{stem}.json", json_text(data))
     if find_spec("matplotlib") is None:
         return [f"{folder / stem}.json written; {NO_MATPLOTLIB}"]
-    from qpmpc.codegen.pil_pictures import draw_pareto, draw_pil
+    from qpmpc.codegen.pil.pictures import draw_pareto, draw_pil
 
     default = AdmmSettings().iterations
     shown = min(pareto.results, key=lambda result: abs(result.iterations - default))
@@ -107,7 +107,7 @@ def write_pareto(pareto: Pareto, folder: Path) -> list[str]:
 def pareto_table(rows: Sequence[dict[str, Any]]) -> Table:
     """Return one line a run for the terminal."""
     table = Table(title=f"{rows[0]['cycle']}: fuel against instructions on a Cortex-M7")
-    for name in ("solver", "precision"):
+    for name in ("algorithm", "precision"):
         table.add_column(name)
     for name in ("K", "instructions a step", "spread %", "flash B", "RAM B", "above DP %"):
         table.add_column(name, justify="right")
@@ -118,7 +118,7 @@ def pareto_table(rows: Sequence[dict[str, Any]]) -> Table:
         flips = len(row["on_off_flips"])
         remarks += [f"on/off differs from Python in {flips} steps"] if flips else []
         table.add_row(
-            row["solver"],
+            row["algorithm"],
             row["precision"],
             f"{row['iterations']}",
             f"{row['instructions']['median']:,}",
@@ -140,7 +140,7 @@ def _html(
 ) -> str:
     """Return the report: one page that needs no other file."""
     times = rows[0]["milliseconds_estimated"]
-    template = files("qpmpc.codegen").joinpath("pil.html.j2").read_text("utf-8")
+    template = files("qpmpc.codegen.pil").joinpath("pil.html.j2").read_text("utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     return environment.from_string(template).render(
         cycle=shown.run.cycle,

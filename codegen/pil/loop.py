@@ -18,7 +18,7 @@ from qpmpc.codegen.firmware import (
     build_firmware,
     footprint,
 )
-from qpmpc.codegen.generate import Precision, Solver
+from qpmpc.codegen.generate import Algorithm, Precision
 from qpmpc.codegen.values import values_of
 from qpmpc.controllers.base import Controller, Decision, Progress
 from qpmpc.controllers.mh_qp import MhQp
@@ -51,7 +51,7 @@ class PilResult:
     """
 
     target: str
-    solver: Solver
+    algorithm: Algorithm
     precision: Precision
     iterations: int
     run: Run
@@ -93,7 +93,7 @@ class PilResult:
         return {
             "cycle": self.run.cycle,
             "target": self.target,
-            "solver": self.solver,
+            "algorithm": self.algorithm,
             "precision": self.precision,
             "iterations": self.iterations,
             "steps": len(counts),
@@ -181,7 +181,7 @@ def processor_in_the_loop(
     settings: ControllerSettings | None = None,
     precision: Precision = "f32",
     progress: Progress | None = None,
-    solver: Solver = "admm",
+    algorithm: Algorithm = "admm",
 ) -> PilResult:
     """Drive a trip with the firmware in QEMU (mps2-an500, Cortex-M7) on the Python plant.
 
@@ -190,7 +190,7 @@ def processor_in_the_loop(
     trip, settings : what is driven, and settings of the controllers
     precision : of the firmware
     progress : called as progress(steps done, steps in all)
-    solver : of the firmware
+    algorithm : of the firmware
 
     Raises
     ------
@@ -212,9 +212,9 @@ def processor_in_the_loop(
 
     with TemporaryDirectory(prefix="qpmpc-pil-") as scratch:
         folder = Path(scratch)
-        elf = build_firmware(values, precision, folder, solver)
+        elf = build_firmware(values, precision, folder, algorithm)
         with Target(elf, values, precision, folder) as target:
-            label = f"{solver} {precision} on cortex-m7"
+            label = f"{algorithm} {precision} on cortex-m7"
             firmware = _OnTarget(trip, settings, target, label)
             start = perf_counter()
             run = drive(trip, firmware, on_step=compare, progress=progress)
@@ -222,7 +222,7 @@ def processor_in_the_loop(
         memory = footprint(elf)
     return PilResult(
         target="cortex-m7",
-        solver=solver,
+        algorithm=algorithm,
         precision=precision,
         iterations=values.iterations,
         run=run,

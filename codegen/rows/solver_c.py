@@ -2,14 +2,14 @@
 
 from collections.abc import Iterable
 
-from qpmpc.codegen.elimination import (
+from qpmpc.codegen.rows.elimination import (
     Elimination,
     factor_type,
     factorise,
     substitute,
     weight,
 )
-from qpmpc.codegen.rows_c import (
+from qpmpc.codegen.rows.stage_c import (
     bounds,
     function,
     header,
@@ -28,13 +28,13 @@ from qpmpc.qp.rows import ROWS, Entry, Var
 MATRIX = "const mpc_stage_matrix *const a = &stage->a;"
 
 
-def rows_files(scalars: Iterable[str], solver: str) -> dict[str, str]:
+def rows_files(scalars: Iterable[str], algorithm: str) -> dict[str, str]:
     """Return the headers that are made from the table of rows, by name.
 
     Parameters
     ----------
     scalars : names of the controller's parameters
-    solver : `admm` or `osqp`
+    algorithm : `admm` or `osqp`
     """
     names = list(scalars)
     files = {
@@ -42,7 +42,7 @@ def rows_files(scalars: Iterable[str], solver: str) -> dict[str, str]:
         "mpc_rows.h": types_h(),
         "mpc_rows_values.h": values_h(names),
     }
-    if solver == "osqp":
+    if algorithm == "osqp":
         return files | {"mpc_rows_osqp.h": osqp_h()}
     return files | {"mpc_rows_factor.h": factor_h(), "mpc_rows_admm.h": admm_h()}
 

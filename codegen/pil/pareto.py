@@ -1,12 +1,12 @@
-"""Fuel against instructions: precisions, solvers and iteration counts of the firmware, measured."""
+"""Fuel against instructions: precisions, algorithms and iterations of the firmware, measured."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
-from qpmpc.codegen.generate import Precision, Solver
-from qpmpc.codegen.pil import PilResult, processor_in_the_loop
+from qpmpc.codegen.generate import Algorithm, Precision
+from qpmpc.codegen.pil.loop import PilResult, processor_in_the_loop
 from qpmpc.controllers.base import Progress
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.report.provenance import provenance
@@ -25,7 +25,7 @@ class Pareto:
     Attributes
     ----------
     dp_fuel_g : of dynamic programming, the SOC at the end as at the start
-    results : one a solver, precision and iteration count
+    results : one a algorithm, precision and iteration count
     """
 
     dp_fuel_g: float
@@ -52,17 +52,17 @@ class Pareto:
 
 
 def job_count(
-    precisions: Sequence[Precision], solvers: Sequence[Solver], iterations: Sequence[int]
+    precisions: Sequence[Precision], algorithms: Sequence[Algorithm], iterations: Sequence[int]
 ) -> int:
     """Return how many jobs `embedded_pareto` announces."""
-    return 1 + len(precisions) * len(solvers) * len(iterations)
+    return 1 + len(precisions) * len(algorithms) * len(iterations)
 
 
 def embedded_pareto(
     trip: Trip,
     settings: ControllerSettings,
     precisions: Sequence[Precision],
-    solvers: Sequence[Solver],
+    algorithms: Sequence[Algorithm],
     next_job: Job,
     iterations: Sequence[int] = ITERATIONS,
 ) -> Pareto:
@@ -71,7 +71,7 @@ def embedded_pareto(
     Parameters
     ----------
     trip, settings : what is driven; the settings' iterations per step are replaced
-    precisions, solvers, iterations : of the firmware
+    precisions, algorithms, iterations : of the firmware
     next_job : announces a job and returns where it reports its progress, see `job_count`
 
     Raises
@@ -86,8 +86,8 @@ def embedded_pareto(
     grid = settings.of("dp", DpSettings())
     optimum = solve_dp(trip.cycle, trip.vehicle, grid, as_fraction(report))
     results = []
-    for solver, precision, count in product(solvers, precisions, iterations):
+    for algorithm, precision, count in product(algorithms, precisions, iterations):
         chosen = settings.with_settings({"mh_qp.admm.iterations": count})
-        report = next_job(f"{name}, {solver} {precision} K = {count}")
-        results.append(processor_in_the_loop(trip, chosen, precision, report, solver))
+        report = next_job(f"{name}, {algorithm} {precision} K = {count}")
+        results.append(processor_in_the_loop(trip, chosen, precision, report, algorithm))
     return Pareto(float(optimum.fuel_g.sum()), results)

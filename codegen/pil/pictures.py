@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
-from qpmpc.codegen.pil import PilResult
+from qpmpc.codegen.pil.loop import PilResult
 from qpmpc.report.style import BLACK, BLUE, GREY, ORANGE, SKY, VERMILION, png, tidy
 
 LEAST_ERROR_W = 1e-3
@@ -51,7 +51,7 @@ def draw_pil(result: PilResult) -> bytes:
         tidy(axes)
     figure.suptitle(
         f"{result.run.cycle}: controller on {result.target} in QEMU, {result.precision}, "
-        f"solver {result.solver}",
+        f"algorithm {result.algorithm}",
         fontsize=11,
     )
     return png(figure)
@@ -66,8 +66,8 @@ def draw_pareto(rows: Sequence[dict[str, Any]]) -> bytes:
     """
     figure = Figure(figsize=(8.0, 4.6), layout="constrained")
     axes = figure.subplots()
-    for (solver, precision), (color, dashes) in LINES.items():
-        chosen = [r for r in rows if (r["solver"], r["precision"]) == (solver, precision)]
+    for (algorithm, precision), (color, dashes) in LINES.items():
+        chosen = [r for r in rows if (r["algorithm"], r["precision"]) == (algorithm, precision)]
         if not chosen:
             continue
         millions = [r["instructions"]["median"] / 1e6 for r in chosen]
@@ -81,7 +81,7 @@ def draw_pareto(rows: Sequence[dict[str, Any]]) -> bytes:
             linestyle=dashes,
             markersize=5,
             linewidth=1.0,
-            label=f"{solver} {precision}, {ram_kb:.0f} KB RAM",
+            label=f"{algorithm} {precision}, {ram_kb:.0f} KB RAM",
         )
         if precision == "f32":
             for row, x, y in zip(chosen, millions, above, strict=True):

@@ -1,0 +1,1 @@
+"""Processor in the loop: the firmware drives a cycle, counted, compared, reported."""
