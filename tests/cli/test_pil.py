@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-import qpmpc.codegen.pil as loop
+import qpmpc.codegen.pil.loop as loop
 from qpmpc.codegen import firmware
 from qpmpc.codegen.firmware import missing_tools
 from qpmpc.codegen.pil.pareto import ITERATIONS
