@@ -138,32 +138,44 @@ def split_settings(
     InputError
         If the first part of a name is neither, or a controller's setting is not allowed.
     """
-    of_vehicle: dict[str, object] = {}
-    of_controllers: dict[str, object] = {}
+    of_vehicle = {
+        key: value
+        for key, value in settings.items()
+        if key.partition(".")[0] in Vehicle.model_fields and "." in key
+    }
+    of_controllers = {key: value for key, value in settings.items() if key not in of_vehicle}
+    chosen = ControllerSettings().with_settings(of_controllers)
+    check_sections(chosen, controllers)
+    return of_vehicle, chosen
+
+
+def check_sections(
+    settings: ControllerSettings, controllers: Sequence[ControllerLike] = ()
+) -> None:
+    """Check the settings of sections that no controller of the core has.
+
+    Raises
+    ------
+    InputError
+        If there is no controller of that name, or a value is not allowed.
+    """
     own = {_section(what.name): what.Settings for what in controllers if not isinstance(what, str)}
     named = {_section(name): name for name in controller_names()}
-    for key, value in settings.items():
-        section, _, rest = key.partition(".")
-        if section in Vehicle.model_fields and rest:
-            of_vehicle[key] = value
-        elif section in {*ControllerSettings.sections(), *own, *named}:
-            of_controllers[key] = value
+    for section, values in settings.others.items():
+        if section in own:
+            model = own[section]
+        elif section in named:
+            model = _table_of(named[section]).settings_model(named[section])
         else:
             known = {*ControllerSettings.sections(), "dp", *own, *Vehicle.model_fields} - _SCALARS
+            key = ".".join([section, *list(values)[:1]])
             raise InputError(
                 f"no parameter {key!r}: names start with one of {', '.join(sorted(known))} "
                 "and a dot"
             )
-    chosen = ControllerSettings().with_settings(of_controllers)
-    for section in chosen.others:
-        if section in own:
-            model = own[section]
-        else:
-            model = _table_of(named[section]).settings_model(named[section])
         if model is None:
             raise InputError(f"controller {section.replace('_', '-')!r} has no settings of its own")
-        chosen.of(section, model())  # refuses what does not fit
-    return of_vehicle, chosen
+        settings.of(section, model())  # refuses what does not fit
 
 
 _SCALARS = {"name", "description", "base"}

@@ -10,7 +10,7 @@ from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle
 from qpmpc.errors import InputError
 from qpmpc.preview.forecast import Trace
-from qpmpc.registry import ControllerLike, make_controller, split_settings
+from qpmpc.registry import ControllerLike, check_sections, make_controller, split_settings
 from qpmpc.results import Run
 from qpmpc.trip import Trip, as_trip
 from qpmpc.vehicle import Vehicle
@@ -67,6 +67,7 @@ def prepared(
     chosen = ControllerSettings()
     if isinstance(settings, ControllerSettings):
         chosen = settings
+        check_sections(chosen, controllers)
     elif settings is not None:
         of_vehicle, chosen = split_settings(settings, controllers)
     made_already = all(isinstance(what, Controller | Planner) for what in controllers)

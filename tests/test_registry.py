@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from qpmpc import Controller, InputError, Planner, Trip
+from qpmpc import Controller, ControllerSettings, InputError, Planner, Trip, simulate
 from qpmpc.registry import (
     CONTROLLERS,
     PLANNERS,
@@ -91,13 +91,21 @@ def test_settings_are_split() -> None:
         ("dp.nonsense", 1, "nonsense"),
         ("dp.refinement", 0.5, "refinement"),
         ("mh_nlp.x", 1, "no settings of its own"),
-        ("name", "x", "names start with one of"),
+        ("name", "x", "names start with a section"),
+        ("others.x", 1, "names start with one of"),
+        ("mhqp.admm.iterations", 1, "names start with one of"),
     ],
 )
 def test_wrong_settings_are_one_line(key: str, value: object, said: str) -> None:
     with pytest.raises(InputError, match=said) as refusal:
         split_settings({key: value})
     assert "\n" not in str(refusal.value)
+
+
+def test_made_settings_of_nobody_are_refused_too() -> None:
+    settings = ControllerSettings().with_settings({"mhqp.admm.iterations": 25})
+    with pytest.raises(InputError, match="'mhqp.admm.iterations'"):
+        simulate("nycc", settings=settings)
 
 
 class Own(Planner):

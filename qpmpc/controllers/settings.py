@@ -202,7 +202,12 @@ class ControllerSettings(BaseModel):
         for key, value in settings.items():
             refuse_old_name(key, value)
             section, _, rest = key.partition(".")
-            if section in self.sections() or not rest:
+            if not rest:
+                raise InputError(
+                    f"no parameter {key!r}: names start with a section and a dot, "
+                    "such as mh_qp.admm.iterations"
+                )
+            if section in self.sections():
                 ours[key] = value
             else:
                 others.setdefault(section, {})[rest] = value
