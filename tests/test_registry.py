@@ -104,7 +104,7 @@ def test_wrong_settings_are_one_line(key: str, value: object, said: str) -> None
 
 def test_made_settings_of_nobody_are_refused_too() -> None:
     settings = ControllerSettings().with_settings({"mhqp.admm.iterations": 25})
-    with pytest.raises(InputError, match="'mhqp.admm.iterations'"):
+    with pytest.raises(InputError, match=r"'mhqp\.admm\.iterations'"):
         simulate("nycc", settings=settings)
 
 
