@@ -1,8 +1,5 @@
 """Which implementation runs a QP controller on this machine: generated C, or Python."""
 
-import logging
-from functools import cache
-
 from qpmpc.codegen.controller import GeneratedController
 from qpmpc.codegen.host_library import CodegenError, compiler
 from qpmpc.controllers.base import Controller
@@ -10,9 +7,10 @@ from qpmpc.controllers.qp_planner import QpPlanner
 from qpmpc.controllers.receding_horizon import RecedingHorizon
 from qpmpc.controllers.settings import ControllerSettings, MhQpSettings
 from qpmpc.errors import InputError
+from qpmpc.remarks import say_once
 from qpmpc.trip import Trip
 
-SLOWER = "steps take several times longer"
+SLOWER = "steps take several times longer (mh_qp.implementation=python says that this is meant)"
 
 
 def mh_qp(trip: Trip, settings: ControllerSettings | None = None) -> Controller:
@@ -48,11 +46,5 @@ def _made(name: str, trip: Trip, settings: ControllerSettings, of_qp: MhQpSettin
     controller = RecedingHorizon(trip, QpPlanner(trip, settings, of_qp, name=name))
     if reason:
         controller.remarks.append(reason)
-        _say_once(reason)
+        say_once(reason)
     return controller
-
-
-@cache
-def _say_once(line: str) -> None:
-    """Say it on stderr, where nobody has configured logging otherwise; once a process."""
-    logging.getLogger("qpmpc").warning("%s", line)

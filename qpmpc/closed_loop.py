@@ -60,8 +60,17 @@ def drive(
         controller=controller.name,
         solver=controller.solver_name,
         implementation=controller.implementation,
-        remarks=tuple(controller.remarks),
+        remarks=(*controller.remarks, *_fallbacks(controller.name, record.fallback)),
         vehicle=trip.vehicle,
         distance_km=trip.cycle.distance_m / 1e3,
         trajectory=record,
     )
+
+
+def _fallbacks(name: str, rungs: list[str]) -> list[str]:
+    """Say so where something other than the controller's own plan drove."""
+    steps = [k for k, rung in enumerate(rungs) if rung]
+    if not steps:
+        return []
+    what = " and ".join(sorted({rungs[k] for k in steps}))
+    return [f"{name}: {what} drove in {len(steps)} of {len(rungs)} s, first at {steps[0]} s"]

@@ -11,7 +11,7 @@ from rich.console import Console
 from qpmpc.closed_loop import drive
 from qpmpc.controllers.base import Controller, Progress
 from qpmpc.controllers.receding_horizon import Planner
-from qpmpc.controllers.settings import ControllerSettings
+from qpmpc.controllers.settings import ControllerSettings, SettingsLike
 from qpmpc.cycles import Cycle
 from qpmpc.errors import InputError
 from qpmpc.files import json_text, write_text
@@ -20,8 +20,9 @@ from qpmpc.report.columns import COMPARE_COLUMNS, notes
 from qpmpc.report.table import print_rows
 from qpmpc.report.write import comparison_html, write_comparison
 from qpmpc.results import Run, compare_runs
-from qpmpc.simulation import CycleLike, SettingsLike, VehicleLike, prepared
+from qpmpc.simulation import CycleLike, VehicleLike, prepared, remark_idle_settings
 from qpmpc.trip import Trip, as_trip
+from qpmpc.vehicle import Vehicle
 
 DEFAULT_CONTROLLERS = ("rule-based", "mh-qp-paper", "mh-qp")
 PRINTED_WIDTH = 200
@@ -39,6 +40,7 @@ class Runs(Sequence[Run]):
 
     def __init__(self, runs: Sequence[Run], settings: ControllerSettings | None = None) -> None:
         self._runs = list(runs)
+        _one_vehicle([run.vehicle for run in self._runs])
         self.settings = settings or ControllerSettings()
 
     @overload
@@ -118,7 +120,7 @@ def compare(
     """
     several = [cycles] if isinstance(cycles, str | os.PathLike | Cycle | Trip) else list(cycles)
     wanted = [controllers] if isinstance(controllers, ONE) else list(controllers)
-    check_controllers([what for what in wanted if isinstance(what, str)])
+    check_controllers(wanted)
     trips: list[Trip] = []
     chosen = ControllerSettings()
     for cycle in several:
@@ -126,8 +128,10 @@ def compare(
         if trip.cycle.name in [other.cycle.name for other in trips]:
             raise InputError(f"cycle {trip.cycle.name!r} is named twice")
         trips.append(trip)
+    _one_vehicle([trip.vehicle for trip in trips])
     # before any run, so that what does not fit is refused then
     of_first = [make_controller(what, trip, chosen) for trip in trips[:1] for what in wanted]
+    remark_idle_settings(of_first, settings, wanted)
     runs = []
     for trip in trips:  # one after the other, so that step times are not disturbed
         for i, what in enumerate(wanted):
@@ -136,3 +140,13 @@ def compare(
             made = of_first[i] if trip is trips[0] else make_controller(what, trip, chosen)
             runs.append(drive(trip, made, progress=report))
     return Runs(runs, chosen)
+
+
+def _one_vehicle(vehicles: Sequence[Vehicle]) -> None:
+    """Refuse several: tables and pictures tell runs apart by cycle and controller alone."""
+    if any(vehicle != vehicles[0] for vehicle in vehicles):
+        names = ", ".join(dict.fromkeys(vehicle.name for vehicle in vehicles))
+        raise InputError(
+            f"one comparison has one vehicle with one set of parameters, not several ({names}): "
+            "make one for each"
+        )

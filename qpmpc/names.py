@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from qpmpc.errors import InputError
+from qpmpc.remarks import say_once
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,9 @@ class Names:
     def added(self) -> dict[str, EntryPoint]:
         """Entry points of other packages by name."""
         found = sorted(entry_points(group=f"qpmpc.{self.kind}s"), key=lambda point: point.value)
+        for point in found:
+            if point.name in self.shipped:
+                say_once(f"{self.kind} {point.name!r} of {point.value} is not used: a shipped name")
         return {point.name: point for point in found if point.name not in self.shipped}
 
     def names(self) -> tuple[str, ...]:

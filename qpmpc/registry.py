@@ -4,7 +4,8 @@ Another package adds controllers, planners, solvers, vehicles, cycles and checks
 see `Names`; ``docs/extending.md`` shows how.
 """
 
-from collections.abc import Mapping, Sequence
+import inspect
+from collections.abc import Callable, Mapping, Sequence
 
 from qpmpc.controllers.base import Controller
 from qpmpc.controllers.receding_horizon import Planner, RecedingHorizon
@@ -70,18 +71,30 @@ def controller_names() -> tuple[str, ...]:
     return (*CONTROLLERS.names(), *PLANNERS.names())
 
 
-def check_controllers(names: Sequence[str]) -> None:
+def check_controllers(controllers: Sequence[ControllerLike]) -> None:
     """Check that each controller can run here, before any time is spent.
 
     Raises
     ------
     InputError
-        If a name is unknown or given twice, or a package that it needs is not installed.
+        If a name is unknown or given twice, a class of somebody else's has a shipped name, or a
+        package that a controller needs is not installed.
     """
-    for i, name in enumerate(names):
-        _table_of(name).check(name)
-        if name in names[:i]:
+    shipped = {*CONTROLLERS.shipped, *PLANNERS.shipped}
+    names: list[str] = []
+    for what in controllers:
+        name = what if isinstance(what, str) else getattr(what, "name", repr(what))
+        if isinstance(what, str):
+            _table_of(name).check(name)
+        elif name in shipped and not _kind(what).__module__.startswith("qpmpc."):
+            raise InputError(f"controller {name!r}: this name is that of a shipped one")
+        if name in names:
             raise InputError(f"controller {name!r} is named twice")
+        names.append(name)
+
+
+def _kind(what: object) -> type:
+    return what if isinstance(what, type) else type(what)
 
 
 def make_controller(
@@ -99,21 +112,36 @@ def make_controller(
     InputError
         If a name is unknown, a package is missing, or a setting does not fit.
     """
-    made = what
+    made: object = what
     if isinstance(what, str):
-        made = _table_of(what).find(what)(trip, settings)
+        made = _called(_table_of(what).find(what), what, trip, settings)
     elif isinstance(what, type):
-        made = what(trip, settings)
-    if isinstance(made, Planner):
-        made = RecedingHorizon(trip, made, None if made is what else settings)
-    if not isinstance(made, Controller):
+        made = _called(what, what.__name__, trip, settings)
+    if not isinstance(made, Controller | Planner):
         raise InputError(
             f"controller {what!r} is neither a qpmpc.Controller nor a qpmpc.Planner, "
             f"but a {type(made).__name__}"
         )
-    if isinstance(what, str):
-        made.name = what
+    if isinstance(what, str) and made.name != what:
+        raise InputError(
+            f"controller {what!r} leads to one with the name {made.name!r}: the two must be equal"
+        )
+    if isinstance(made, Planner):
+        return RecedingHorizon(trip, made, None if made is what else settings)
     return made
+
+
+def _called(
+    maker: Callable[..., object], name: str, trip: Trip, settings: ControllerSettings | None
+) -> object:
+    """Call what makes a controller, if it can be called so."""
+    try:
+        inspect.signature(maker).bind(trip, settings)
+    except TypeError as error:
+        raise InputError(
+            f"controller {name!r} must be made of a trip and settings: {error}"
+        ) from error
+    return maker(trip, settings)
 
 
 def _table_of(name: str) -> Names:
@@ -178,6 +206,31 @@ def check_sections(
         settings.of(section, model())  # refuses what does not fit
 
 
+def without_effect(settings: Mapping[str, object], controllers: Sequence[ControllerLike]) -> str:
+    """Say which settings of shipped controllers reach none of those that will run.
+
+    Controllers of somebody else's may read any of them.
+    """
+    if not all(isinstance(what, str) and what in _READS for what in controllers):
+        return ""
+    names = [what for what in controllers if isinstance(what, str)]
+    read = {section for name in names for section in _READS[name]}
+    idle = sorted(
+        key for key in settings if key.partition(".")[0] not in {*Vehicle.model_fields, *read}
+    )
+    return f"no effect on {', '.join(names)}: {', '.join(idle)}" if idle else ""
+
+
+# Sections of settings that shipped controllers read; the rules are the last rung of most.
+_READS = {
+    "mh-qp": ("mh_qp", "rule_based"),
+    "mh-qp-paper": ("mh_qp_paper", "rule_based"),
+    "baseline-mpc": ("baseline_mpc", "rule_based"),
+    "mh-nlp": ("mh_qp", "rule_based"),
+    "rule-based": ("rule_based",),
+    "ecms": ("ecms", "rule_based"),
+    "dp": ("dp",),
+}
 _SCALARS = {"name", "description", "base"}
 
 

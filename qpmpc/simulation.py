@@ -1,23 +1,30 @@
 """The calls that most users make: simulate one run, by names or objects alike."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from qpmpc.closed_loop import OnStep, drive
 from qpmpc.controllers.base import Controller, Progress
 from qpmpc.controllers.receding_horizon import Planner
-from qpmpc.controllers.settings import ControllerSettings
+from qpmpc.controllers.settings import ControllerSettings, SettingsLike, as_settings
 from qpmpc.cycles import Cycle
 from qpmpc.errors import InputError
 from qpmpc.preview.forecast import Trace
-from qpmpc.registry import ControllerLike, check_sections, make_controller, split_settings
+from qpmpc.registry import (
+    ControllerLike,
+    check_controllers,
+    check_sections,
+    make_controller,
+    split_settings,
+    without_effect,
+)
+from qpmpc.remarks import say_once
 from qpmpc.results import Run
 from qpmpc.trip import Trip, as_trip
 from qpmpc.vehicle import Vehicle
 
 CycleLike = str | os.PathLike[str] | Cycle | Trip
 VehicleLike = str | os.PathLike[str] | Vehicle
-SettingsLike = Mapping[str, object] | ControllerSettings
 
 
 def simulate(
@@ -48,8 +55,10 @@ def simulate(
     QpmpcError
         If the controller given belongs to another trip or has driven already.
     """
+    check_controllers([controller])
     trip, chosen = prepared(as_trip(cycle, vehicle, forecast), settings, [controller])
     made = make_controller(controller, trip, chosen)
+    remark_idle_settings([made], settings, [controller])
     return drive(trip, made, on_step=on_step, progress=progress)
 
 
@@ -64,18 +73,29 @@ def prepared(
         If a name or value is not allowed, or has no effect on a controller made already.
     """
     of_vehicle: dict[str, object] = {}
-    chosen = ControllerSettings()
-    if isinstance(settings, ControllerSettings):
-        chosen = settings
-        check_sections(chosen, controllers)
-    elif settings is not None:
+    if isinstance(settings, Mapping):
         of_vehicle, chosen = split_settings(settings, controllers)
+    else:
+        chosen = as_settings(settings)
+        check_sections(chosen, controllers)
     made_already = all(isinstance(what, Controller | Planner) for what in controllers)
-    if made_already and chosen != ControllerSettings():
+    if made_already and (of_vehicle or chosen != ControllerSettings()):
         raise InputError(
-            "settings have no effect on a controller that is made already: make it with them"
+            "settings have no effect on a controller that is made already: "
+            "make it, and its trip, with them"
         )
     if of_vehicle:
         forecast = None if trip.forecast is trip.truth else trip.forecast
         trip = Trip(trip.cycle, trip.vehicle.with_settings(of_vehicle), forecast)
     return trip, chosen
+
+
+def remark_idle_settings(
+    made: Sequence[Controller], settings: SettingsLike | None, controllers: Sequence[ControllerLike]
+) -> None:
+    """Say which settings, if any, reach none of the controllers, here and in their runs."""
+    line = without_effect(settings, controllers) if isinstance(settings, Mapping) else ""
+    if line:
+        say_once(line)
+        for controller in made:
+            controller.remarks.append(line)

@@ -5,7 +5,16 @@ import time
 import numpy as np
 import pytest
 
-from qpmpc import Command, Controller, Cycle, QpmpcError, Trip, load_cycle, simulate
+from qpmpc import (
+    Command,
+    Controller,
+    Cycle,
+    InputError,
+    QpmpcError,
+    Trip,
+    load_cycle,
+    simulate,
+)
 from qpmpc.closed_loop import drive
 from qpmpc.codegen.host_library import compiler
 from qpmpc.controllers.base import Decision
@@ -67,7 +76,7 @@ def test_progress_counts_the_steps() -> None:
     assert seen == [(k, trip.steps) for k in range(1, trip.steps + 1)]
 
 
-@pytest.mark.parametrize("command", [Command(True, float("nan")), Command(True, 1e9)])
+@pytest.mark.parametrize("command", [Command(True, -1e9), Command(True, 1e9)])
 def test_what_a_step_returns_is_made_admissible(command: Command) -> None:
     class Wild(Half):
         def step(self, seen: Observation) -> Command:
@@ -76,6 +85,40 @@ def test_what_a_step_returns_is_made_admissible(command: Command) -> None:
     run = simulate(SHORT, Wild)
     assert run.controller == "half"
     assert not any(run.summary()["violations"].values())
+
+
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        (None, "step returned None at 0 s, where a Command or a Decision is needed"),
+        ((True, 5e3), r"step returned \(True, 5000.0\)"),
+        (Command(True, float("nan")), "p_eng_w=nan at 0 s, where a bool and a finite number"),
+        (Command(5e3, True), "engine_on=5000.0"),
+        (Command("on", "high"), "engine_on='on'"),
+        (Decision(None), "where a Command or a Decision is needed"),
+    ],
+)
+def test_what_is_no_command_is_one_line(made: object, said: str) -> None:
+    class Broken(Half):
+        def step(self, seen: Observation) -> Command:
+            return made
+
+    with pytest.raises(QpmpcError, match=f"half: .*{said}") as refusal:
+        simulate(SHORT, Broken)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_class_without_a_name_has_that_of_the_class() -> None:
+    class EagerDriver(Controller):
+        def step(self, seen: Observation) -> Command:
+            return Command(False, 0.0)
+
+    class Renamed(EagerDriver):
+        name = "a/b"
+
+    assert simulate(SHORT, EagerDriver).controller == "eager-driver"
+    with pytest.raises(InputError, match="name 'a/b' must have 1 to 64 letters"):
+        simulate(SHORT, Renamed)
 
 
 def test_a_controller_drives_once_until_it_is_reset() -> None:

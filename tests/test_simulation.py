@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from qpmpc.codegen import implementation
+from qpmpc import Command, Controller, remarks
 from qpmpc.codegen.host_library import compiler
 from qpmpc.comparison import compare
 from qpmpc.controllers.ecms import Ecms
@@ -16,7 +16,7 @@ from qpmpc.controllers.mh_qp import MhQp
 from qpmpc.controllers.rule_based import RuleBased
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle
-from qpmpc.errors import InputError, QpmpcError
+from qpmpc.errors import InputError
 from qpmpc.registry import (
     CONTROLLERS,
     PLANNERS,
@@ -103,7 +103,7 @@ def test_settings_that_come_too_late_are_refused(trip):
             with pytest.raises(InputError, match="made already"):
                 simulate(road, made, settings=settings)
         simulate(road, made, settings=ControllerSettings())
-    with pytest.raises(QpmpcError, match="was made for"):
+    with pytest.raises(InputError, match="made already: make it, and its trip, with them"):
         simulate(road, RuleBased(road), settings={"thermal.t_amb_degc": -15.0})
     runs = compare(road, [RuleBased(road), Ecms], settings=late)  # there they reach one of two
     assert [run.controller for run in runs] == ["rule-based", "ecms"]
@@ -154,7 +154,7 @@ def test_what_generated_c_cannot_do_is_refused_where_c_is_asked_for(trip, chosen
 @pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
 @pytest.mark.parametrize(("chosen", "named"), BEYOND_C)
 def test_auto_falls_back_to_python_and_says_so(trip, caplog, chosen, named):
-    implementation._say_once.cache_clear()
+    remarks.say_once.cache_clear()
     with caplog.at_level(logging.WARNING):
         run = simulate(trip, "mh-qp", settings=chosen)
         (remark,) = run.remarks
@@ -214,3 +214,44 @@ def test_piqp_named_by_settings_drives_as_the_backend_given(trip):
     np.testing.assert_array_equal(by_name.trajectory.p_eng_w, by_argument.trajectory.p_eng_w)
     made = make_controller("mh-qp", road, ControllerSettings().with_settings(chosen))
     assert (made.implementation, made.solver_name) == ("python", "piqp")
+
+
+def test_two_of_one_name_and_a_shipped_name_are_refused(trip):
+    class Own(Controller):
+        def step(self, seen):
+            return Command(False, 0.0)
+
+    class RuleBased(Own):
+        pass
+
+    for twice in ([Own, Own], ["mh-qp", "mh-qp"]):
+        with pytest.raises(InputError, match="is named twice"):
+            compare(trip, twice)
+    with pytest.raises(InputError, match="'rule-based': this name is that of a shipped one"):
+        simulate(trip, RuleBased)
+
+
+def test_one_comparison_has_one_vehicle(trip):
+    cars = [Trip("nycc", "prius-nimh"), Trip("udds", "prius-liion")]
+    with pytest.raises(InputError, match=r"not several \(prius-nimh, prius-liion\)"):
+        compare(cars, ["rule-based"])
+
+
+def test_settings_without_effect_are_said(trip, caplog):
+    run = simulate(trip, "rule-based", settings={"mh_qp.admm.iterations": 25, "ecms.factor": 3.0})
+    line = "no effect on rule-based: ecms.factor, mh_qp.admm.iterations"
+    assert run.summary()["remarks"] == [line]
+    assert caplog.messages == [line]
+    quiet = simulate(trip, "rule-based", settings={"rule_based.on_w": 7e3})
+    assert quiet.summary()["remarks"] == []
+
+
+def test_what_is_no_settings_is_one_line(trip):
+    for wrong in ("mh_qp.admm.iterations=25", [1], 3):
+        with pytest.raises(InputError, match="settings must be a dictionary of dotted names"):
+            simulate(trip, settings=wrong)
+
+
+def test_settings_by_dotted_name_make_a_controller_too(trip):
+    made = MhQp(Trip(trip), {"mh_qp.admm.iterations": 25})
+    assert made.settings.mh_qp.admm.iterations == 25

@@ -7,6 +7,8 @@ import typer
 
 from qpmpc.cli.options import SetOption, VehicleOption
 
+ITERATIONS = "mh_qp.admm.iterations"
+
 
 def codegen(
     folder: Annotated[
@@ -60,14 +62,17 @@ def codegen(
     from qpmpc.codegen.generate import ALGORITHMS, PRECISIONS, TARGETS, generate, one_of
     from qpmpc.codegen.prefix import checked_prefix
     from qpmpc.codegen.values import values_of
+    from qpmpc.errors import InputError
 
     of_target = one_of(target, TARGETS, "target")
     of_precision = one_of(precision, PRECISIONS, "precision")
     of_algorithm = one_of(algorithm, ALGORITHMS, "algorithm")
     checked_prefix(prefix)
     overrides = list(set_ or [])
+    if iterations is not None and any(o.startswith(f"{ITERATIONS}=") for o in overrides):
+        raise InputError(f"--iterations and --set {ITERATIONS} name one setting: leave one out")
     if iterations is not None:
-        overrides.append(f"mh_qp.admm.iterations={iterations}")
+        overrides.append(f"{ITERATIONS}={iterations}")
     car, settings = load_vehicle_and_settings(vehicle, overrides)
     values = values_of(car, settings.mh_qp, settings.rule_based)
     files = generate(values, folder, of_target, of_precision, of_algorithm, prefix)

@@ -40,21 +40,22 @@ def compare(
       qpmpc compare nycc --vehicle my_car.toml --set trip.soc_init=0.55
     """
     from qpmpc.cli.console import progress_bar, result_console, write_json
-    from qpmpc.cli.inputs import check_outputs, load_vehicle_and_settings
+    from qpmpc.cli.inputs import check_outputs
     from qpmpc.comparison import compare as run
     from qpmpc.registry import check_controllers
-    from qpmpc.report.columns import COMPARE_COLUMNS, notes
+    from qpmpc.report.columns import COMPARE_COLUMNS
     from qpmpc.report.table import print_rows
+    from qpmpc.settings import parse_settings
 
     names = [name.strip() for name in controllers.split(",")]
     check_controllers(names)
-    car, settings = load_vehicle_and_settings(vehicle, set_)
+    settings = parse_settings(set_ or [])
     check_outputs(json_file, out)
     with progress_bar(len(cycles) * len(names)) as bar:
-        runs = run(cycles, names, car, settings=settings, next_job=bar.next_job)
+        runs = run(cycles, names, vehicle, settings=settings, next_job=bar.next_job)
     rows = runs.rows()
     write_json({"runs": rows}, json_file)
-    remarks = notes(rows)
+    remarks = runs.remarks()
     if out is not None:
         remarks += runs.write(out)
     console = result_console(json_file)

@@ -31,24 +31,25 @@ def simulate(
       qpmpc simulate udds --set thermal.t_amb_degc=-15 --set mh_qp.admm.iterations=25 --json -
     """
     from qpmpc.cli.console import progress_bar, result_console, write_json
-    from qpmpc.cli.inputs import check_outputs, load_vehicle_and_settings
+    from qpmpc.cli.inputs import check_outputs
     from qpmpc.registry import check_controllers
     from qpmpc.report.columns import SIMULATE_COLUMNS, notes
     from qpmpc.report.table import print_rows
     from qpmpc.report.write import write_run
+    from qpmpc.settings import parse_settings
     from qpmpc.simulation import simulate as run
     from qpmpc.trip import Trip
 
     check_controllers([controller])
-    car, settings = load_vehicle_and_settings(vehicle, set_)
-    trip = Trip(cycle, car)
+    settings = parse_settings(set_ or [])
+    trip = Trip(cycle, vehicle)
     check_outputs(json_file, out)
     with progress_bar(1) as bar:
         report = bar.next_job(f"{trip.cycle.name}, {controller}")
         finished = run(trip, controller, settings=settings, progress=report)
     summary = finished.summary()
     write_json(summary, json_file)
-    remarks = notes([summary])
+    remarks = [*notes([summary]), *summary["remarks"]]
     if out is not None:
         remarks += write_run(finished, out)
     console = result_console(json_file)

@@ -1,14 +1,18 @@
 """The base of all controllers: one observation in, one decision out, every second."""
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import ClassVar, NamedTuple
+from math import isfinite
+from numbers import Real
+from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
 from pydantic import BaseModel
 
 from qpmpc.controllers.safety import SafetyLayer
-from qpmpc.controllers.settings import ControllerSettings
-from qpmpc.errors import QpmpcError
+from qpmpc.controllers.settings import SettingsLike, as_settings
+from qpmpc.errors import InputError, QpmpcError
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.plant import Command
 
@@ -29,7 +33,65 @@ class Decision(NamedTuple):
     on_share: float = float("nan")
 
 
-class Controller(ABC):
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
+
+
+class Driver:
+    """What controllers and planners have in common: name, trip and settings.
+
+    Parameters
+    ----------
+    trip : to be driven
+    settings : of all controllers, or some of them by dotted name
+
+    Attributes
+    ----------
+    name : under which results are reported; letters, digits, dots, dashes, underscores. A class
+        attribute will do; without one it is made of the name of the class
+    solver_name : of the QP or program solved each second, empty where there is none
+    Settings : pydantic model of settings of its own, if any. With the name ``my-own`` its fields
+        are reached as ``my_own.FIELD``, and their values by ``self.own_settings()``.
+
+    Raises
+    ------
+    InputError
+        If the name has another form, or a setting is not allowed.
+    """
+
+    name: str = ""
+    solver_name: str = ""
+    Settings: ClassVar[type[BaseModel] | None] = None
+    _has_name: ClassVar[bool] = False  # its own, or from a class above it
+
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        cls._has_name = cls._has_name or "name" in vars(cls)
+        if not cls._has_name:
+            cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", cls.__name__).lower()
+
+    def __init__(self, trip: Trip, settings: SettingsLike | None = None) -> None:
+        if not NAME.fullmatch(self.name):
+            raise InputError(
+                f"{type(self).__name__}: name {self.name!r} must have 1 to 64 letters, digits, "
+                "dots, dashes and underscores"
+            )
+        self.trip = trip
+        self.settings = as_settings(settings)
+
+    def own_settings(self) -> BaseModel:
+        """Return the values of `Settings`, with what the user set.
+
+        Raises
+        ------
+        InputError
+            If a value is not allowed.
+        """
+        if not (isinstance(self.Settings, type) and issubclass(self.Settings, BaseModel)):
+            raise QpmpcError(f"{type(self).__name__}: Settings is no pydantic model")
+        return self.settings.of(self.name.replace("-", "_"), self.Settings())
+
+
+class Controller(Driver, ABC):
     """A causal controller; one instance belongs to one trip and drives it once.
 
     A subclass writes `step` and, where it has a memory or something to prepare, `depart`. Whatever
@@ -37,37 +99,28 @@ class Controller(ABC):
 
     Parameters
     ----------
-    trip : to be driven
-    settings : of all controllers
+    trip, settings : as of `Driver`
 
     Attributes
     ----------
-    name : under which results are reported; a class attribute will do
-    solver_name : of the QP or program solved each second, empty where there is none
     implementation : language that the decisions are computed in
     remarks : what a user should know of the choices made for this run, a line each
-    Settings : pydantic model of the controller's own settings, if any. With the name ``my-own``
-        its fields are reached as ``my_own.FIELD``, and their values by ``self.own_settings()``.
     """
 
-    name: str = "own"
-    solver_name: str = ""
     implementation: str = "python"
-    Settings: ClassVar[type[BaseModel] | None] = None
     # a controller whose commands are admissible already, or are to be obeyed as they are
     has_safety_layer: ClassVar[bool] = False
     # whether it decides from second to second, so that the time of a step means something
     decides_online: ClassVar[bool] = True
     _under_way: bool | None = None  # None as long as __init__ has not run
 
-    def __init__(self, trip: Trip, settings: ControllerSettings | None = None) -> None:
-        self.trip = trip
-        self.settings = settings or ControllerSettings()
+    def __init__(self, trip: Trip, settings: SettingsLike | None = None) -> None:
+        super().__init__(trip, settings)
         self.remarks: list[str] = []
         self.safety = SafetyLayer(trip.plant, self.settings.rule_based.heat_power_w)
         self._under_way = False
 
-    def depart(self, progress: Progress | None = None) -> None:  # noqa: B027
+    def depart(self, progress: Progress | None = None) -> None:
         """Get ready before the first second: set the memory, prepare what takes time.
 
         Called once a run.
@@ -87,8 +140,7 @@ class Controller(ABC):
             raise base_not_called(self)
         if not self._under_way:
             self.begin(self.trip)
-        made = self.step(seen)
-        decision = made if isinstance(made, Decision) else Decision(made)
+        decision = _decision_of(self.step(seen), self, seen.step)
         if self.has_safety_layer:
             return decision
         return decision._replace(command=self.safety.admissible(decision.command, seen))
@@ -119,17 +171,23 @@ class Controller(ABC):
         """Make ready for another run of the same trip, which `depart` will begin."""
         self._under_way = False
 
-    def own_settings(self) -> BaseModel:
-        """Return the values of `Settings`, with what the user set.
 
-        Raises
-        ------
-        InputError
-            If a value is not allowed.
-        """
-        if self.Settings is None:
-            raise QpmpcError(f"{type(self).__name__} declares no Settings")
-        return self.settings.of(self.name.replace("-", "_"), self.Settings())
+def _decision_of(made: object, controller: Controller, second: int) -> Decision:
+    """Return what `step` made as a decision, if it can be obeyed."""
+    decision = Decision(made) if isinstance(made, Command) else made
+    if not isinstance(decision, Decision) or not isinstance(decision.command, Command):
+        raise QpmpcError(
+            f"{controller.name}: step returned {made!r} at {second} s, where a Command or a "
+            "Decision is needed"
+        )
+    on: Any = decision.command.engine_on
+    power_w: Any = decision.command.p_eng_w
+    if not (isinstance(on, bool | np.bool_) and isinstance(power_w, Real) and isfinite(power_w)):
+        raise QpmpcError(
+            f"{controller.name}: step commands engine_on={on!r}, p_eng_w={power_w!r} at {second} "
+            "s, where a bool and a finite number of watts are needed"
+        )
+    return decision
 
 
 def base_not_called(made: object) -> QpmpcError:

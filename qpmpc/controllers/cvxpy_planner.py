@@ -2,14 +2,18 @@
 
 from typing import Any
 
+import cvxpy
+
 from qpmpc.controllers.receding_horizon import Plan, Planner
 from qpmpc.controllers.settings import ControllerSettings
-from qpmpc.errors import QpmpcError
+from qpmpc.errors import InputError, QpmpcError
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.cvxpy_twin import CvxpyTwin
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.rows import Var
 from qpmpc.trip import Observation, Trip
+
+cp: Any = cvxpy  # its type hints leave out half of its functions
 
 
 class CvxpyPlanner(Planner):
@@ -26,6 +30,8 @@ class CvxpyPlanner(Planner):
     ----------
     solver : that cvxpy calls; a class attribute will do
     program : the program, with its expressions, objective and constraints
+    preview : cuts the road ahead into stages; the first `preview.settings.short_stages` of them are
+        the seconds ahead, the others are demand classes of blocks, not in the order of time
     """
 
     name = "mh-cvxpy"
@@ -34,11 +40,21 @@ class CvxpyPlanner(Planner):
     def __init__(self, trip: Trip, settings: ControllerSettings | None = None) -> None:
         super().__init__(trip, settings)
         of_qp, vehicle = self.settings.mh_qp, trip.vehicle
+        found: list[str] = cp.installed_solvers()
+        if self.solver not in found:
+            raise InputError(
+                f"{self.name}: cvxpy has no solver {self.solver!r} here, only {', '.join(found)}"
+            )
         self.solver_name = f"cvxpy {self.solver.lower()}"
         self.preview = trip.preview(of_qp.horizon)
         model = PwaModel.of(vehicle, of_qp.pwa)
         self.program = CvxpyTwin(vehicle, model, self.preview.count, of_qp.qp)
-        self.program.add(*self.terms(self.program))
+        added = self.terms(self.program)
+        if not (isinstance(added, tuple) and len(added) == 2):
+            raise QpmpcError(f"{self.name}: terms returned {added!r}, not (cost, [constraints])")
+        self.program.add(*added)
+        if not self.program.problem.is_dcp():
+            raise QpmpcError(f"{self.name}: what terms adds is not convex by cvxpy's rules")
         self._about: Linearisation | None = None
 
     def terms(self, program: CvxpyTwin) -> tuple[Any, list[Any]]:
@@ -64,9 +80,9 @@ class CvxpyPlanner(Planner):
         self.program.update(self.preview.at(seen.step), seen.soc, seen.t_cl_degc, about)
         try:
             x = self.program.solve(self.solver)
-        except QpmpcError:
+        except QpmpcError as error:
             self.forget()
-            return Plan.none()
+            return Plan.none(str(error))
         # short stages move up by one second until the next time
         layout = self.preview.settings
         self._about = Linearisation.about(x[self.preview.shift()], seen.t_cl_degc, layout)

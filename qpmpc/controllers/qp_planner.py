@@ -147,7 +147,7 @@ class QpPlanner(Planner):
         solved = self.solve(seen)
         iterations = solved.solution.iterations
         if not (solved.solution.usable and self.ready):
-            return Plan.none(iterations)
+            return Plan.none(iterations=iterations)
         short = slice(self.of_qp.horizon.short_stages)
         on_share = solved.x[short, Var.ON]
         power_w = power_while_on_w(on_share, solved.x[short, Var.P_ENG])

@@ -2,13 +2,11 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel
 
-from qpmpc.controllers.base import Controller, Decision, Progress, base_not_called
+from qpmpc.controllers.base import Controller, Decision, Driver, Progress, base_not_called
 from qpmpc.controllers.rule_based import RuleBased
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.errors import QpmpcError
@@ -28,6 +26,7 @@ class Plan:
     on_share : sigma, share of each second with the engine on, shape (n,), n >= 1
     power_on_w : engine power while it is on, shape (n,)
     usable : whether it may be acted on
+    reason : why not, in a few words
     iterations : that the solver took
     relaxation_gap : slack of the relaxation at the first second, relative; nan if there is none
     """
@@ -37,6 +36,7 @@ class Plan:
     usable: bool = True
     iterations: int = 0
     relaxation_gap: float = float("nan")
+    reason: str = ""
 
     @classmethod
     def of_means(cls, on_share: ArrayLike, p_eng_w: ArrayLike) -> "Plan":
@@ -45,9 +45,10 @@ class Plan:
         return cls(share, power_while_on_w(share, mean_w))
 
     @classmethod
-    def none(cls, iterations: int = 0) -> "Plan":
-        """Return what a planner gives that has found no plan."""
-        return cls(np.empty(0), np.empty(0), usable=False, iterations=iterations)
+    def none(cls, reason: str = "", iterations: int = 0) -> "Plan":
+        """Return what a planner gives that has found no plan, and why."""
+        nothing = np.empty(0)
+        return cls(nothing, nothing, usable=False, iterations=iterations, reason=reason)
 
 
 def power_while_on_w(
@@ -60,39 +61,27 @@ def power_while_on_w(
     return power
 
 
-class Planner(ABC):
+class Planner(Driver, ABC):
     """Plans the engine over the seconds ahead, once a second; `RecedingHorizon` does the rest.
 
-    A subclass writes `plan`. Where it raises nothing and returns an unusable plan, the ladder of
-    `RecedingHorizon` takes over.
+    A subclass writes `plan`. Where it returns an unusable plan, `Plan.none()` for one, the ladder
+    of `RecedingHorizon` takes over.
 
     Parameters
     ----------
     trip : what the planner may look at: `trip.vehicle`, and the road ahead through
         `qpmpc.preview.StageBuilder`
-    settings : of all controllers
-
-    Attributes
-    ----------
-    name, solver_name, Settings : as of `Controller`
+    settings : as of `Driver`
     """
 
-    name: str = "own"
-    solver_name: str = ""
-    Settings: ClassVar[type[BaseModel] | None] = None
-
-    def __init__(self, trip: Trip, settings: ControllerSettings | None = None) -> None:
-        self.trip = trip
-        self.settings = settings or ControllerSettings()
-
-    def depart(self, seen: Observation) -> None:  # noqa: B027
+    def depart(self, seen: Observation) -> None:
         """Prepare the first plan before the trip starts, and forget any trip before."""
 
     @abstractmethod
     def plan(self, seen: Observation) -> Plan:
         """Plan from the measured state on."""
 
-    def forget(self) -> None:  # noqa: B027
+    def forget(self) -> None:
         """Forget plan and warm start, as after a restart of the ECU on the road."""
 
 
@@ -131,6 +120,7 @@ class RecedingHorizon(Controller):
         self._rules = RuleBased(trip, self.settings)
         self._old: Plan | None = None
         self._old_step = 0
+        self._has_reason = False
 
     def depart(self, progress: Progress | None = None) -> None:
         """Let the planner prepare its first plan."""
@@ -141,7 +131,7 @@ class RecedingHorizon(Controller):
     def step(self, seen: Observation) -> Decision:
         """Run one step: the plan, else the shifted last plan, else the rules."""
         ruled = self._rules.decide(seen)
-        plan = self.planner.plan(seen)
+        plan = self._checked(self.planner.plan(seen), seen.step)
         if plan.usable:
             self._old, self._old_step = plan, seen.step
             on_share = float(plan.on_share[0])
@@ -150,6 +140,27 @@ class RecedingHorizon(Controller):
         if self._old is not None and age < min(PLAN_VALID_STEPS + 1, len(self._old.on_share)):
             return Decision(_at(self._old, age), "shifted plan", plan.iterations)
         return Decision(ruled.command, "rule-based", plan.iterations)
+
+    def _checked(self, plan: Plan, second: int) -> Plan:
+        """Refuse what is no plan; take one that is not finite as unusable."""
+        if not isinstance(plan, Plan):
+            raise QpmpcError(
+                f"{self.name}: plan returned {plan!r} at {second} s, where a Plan is needed; "
+                "Plan.none() where there is none"
+            )
+        if plan.usable and not 1 <= len(plan.on_share) == len(plan.power_on_w):
+            raise QpmpcError(
+                f"{self.name}: the plan at {second} s has {len(plan.on_share)} on-shares and "
+                f"{len(plan.power_on_w)} powers, where one or more of each are needed"
+            )
+        if plan.usable and not (
+            np.isfinite(plan.on_share).all() and np.isfinite(plan.power_on_w).all()
+        ):
+            plan = Plan.none("the plan is not finite", plan.iterations)
+        if plan.reason and not self._has_reason:
+            self._has_reason = True
+            self.remarks.append(f"{self.name}: no plan at {second} s: {plan.reason}")
+        return plan
 
     def forget(self) -> None:
         """Forget plan and warm start, as after a restart of the ECU on the road."""

@@ -238,3 +238,24 @@ def refuse_old_name(key: str, value: object) -> None:
     if rest == "solver" and value in OLD_SOLVERS:
         now = OLD_SOLVERS[str(value)]
         raise InputError(f"{key}={value} is now called {section}.implementation={now}")
+
+
+SettingsLike = Mapping[str, object] | ControllerSettings
+
+
+def as_settings(settings: SettingsLike | None) -> ControllerSettings:
+    """Return settings given by dotted name, or made already, or not at all.
+
+    Raises
+    ------
+    InputError
+        If they are neither, or a name or value is not allowed.
+    """
+    if isinstance(settings, ControllerSettings):
+        return settings
+    if not isinstance(settings, Mapping | None):
+        raise InputError(
+            f"settings must be a dictionary of dotted names, not {settings!r}, "
+            'such as {"mh_qp.admm.iterations": 25}'
+        )
+    return ControllerSettings().with_settings(settings or {})

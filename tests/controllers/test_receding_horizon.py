@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydantic import BaseModel
 
 from qpmpc import (
     Cycle,
@@ -207,3 +208,50 @@ def test_on_from_one_half_up_at_the_mean_over_the_share() -> None:
     np.testing.assert_allclose(plan.power_on_w, [0.0, 0.0, 8e3, 10e3, 9e3, 9e3])
     assert plan.usable
     assert not Plan.none().usable
+
+
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        (None, r"plan returned None at 0 s, where a Plan is needed; Plan.none\(\)"),
+        (Command(True, 5e3), r"plan returned Command"),
+        (Plan(np.ones(3), np.ones(2)), "has 3 on-shares and 2 powers"),
+        (Plan(np.empty(0), np.empty(0)), "has 0 on-shares"),
+    ],
+)
+def test_what_is_no_plan_is_one_line(made: object, said: str) -> None:
+    class Broken(Planner):
+        def plan(self, seen: Observation) -> Plan:
+            return made
+
+    with pytest.raises(QpmpcError, match=f"broken: .*{said}") as refusal:
+        simulate(PART, Broken)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_plan_that_is_not_finite_does_not_drive_and_the_run_says_so() -> None:
+    class Wild(Planner):
+        def plan(self, seen: Observation) -> Plan:
+            return Plan.of_means([1.0, 1.0], [float("nan"), 5e3])
+
+    run = simulate(PART, Wild)
+    assert set(run.trajectory.fallback) == {"rule-based"}
+    assert run.summary()["remarks"] == [
+        "wild: no plan at 0 s: the plan is not finite",
+        "wild: rule-based drove in 120 of 120 s, first at 0 s",
+    ]
+
+
+def test_a_planner_has_its_own_settings() -> None:
+    class PowerSettings(BaseModel):
+        power_w: float = 6e3
+
+    class ManyWatts(Planner):
+        Settings = PowerSettings
+
+        def plan(self, seen: Observation) -> Plan:
+            return Plan.of_means([1.0], [self.own_settings().power_w])
+
+    run = simulate(PART, ManyWatts, settings={"many_watts.power_w": 9e3})
+    assert run.controller == "many-watts"
+    assert run.trajectory.p_eng_w.max() == 9e3

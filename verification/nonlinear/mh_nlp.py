@@ -79,7 +79,7 @@ class MhNlp(Planner):
         """Plan with the solution of this second's program."""
         solved = self.solve(seen)
         if not solved.solved:
-            return Plan.none(solved.iterations)
+            return Plan.none("IPOPT does not converge", solved.iterations)
         on_share = solved.z[: self.of_nlp.horizon.short_stages, NlpVar.ON]
         powers_w = np.zeros_like(on_share)
         for stage in np.flatnonzero(on_share >= ON_THRESHOLD).tolist():
