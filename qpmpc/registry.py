@@ -1,4 +1,4 @@
-"""The top floor: every name a user can type, and what it leads to.
+"""The top layer: every name that a user can type, and its target.
 
 Another package adds controllers, planners, solvers, vehicles, cycles and checks by entry points,
 see `Names`; ``docs/extending.md`` shows how.
@@ -92,7 +92,7 @@ def make_controller(
     Parameters
     ----------
     what : a name, a class of controllers or planners, or one made for this trip already
-    trip, settings : what it is made of
+    trip, settings : that it is made with
 
     Raises
     ------
@@ -131,7 +131,7 @@ def split_settings(
     Parameters
     ----------
     settings : as of ``--set``
-    controllers : that will run; an own controller's section is known by its class
+    controllers : that will run; a user's own controller gives its section by its class
 
     Raises
     ------
@@ -162,7 +162,7 @@ def split_settings(
             model = _table_of(named[section]).settings_model(named[section])
         if model is None:
             raise InputError(f"controller {section.replace('_', '-')!r} has no settings of its own")
-        chosen.of(section, model())  # refuses what does not fit
+        chosen.of(section, model())  # refuses wrong settings
     return of_vehicle, chosen
 
 

@@ -15,20 +15,20 @@ from qpmpc.errors import QpmpcError
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.plant import Command
 
-ON_THRESHOLD = 0.5  # share of a 1 s stage from which the engine runs
+ON_THRESHOLD = 0.5  # share of a 1 s stage from which on the engine runs
 PLAN_VALID_STEPS = 3  # how many steps an old plan may drive before the rules take over
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a planner intends for the seconds ahead.
+    """The plan for the seconds ahead.
 
     Attributes
     ----------
     on_share : sigma, share of each second with the engine on, shape (n,), n >= 1
     power_on_w : engine power while it is on, shape (n,)
-    usable : whether it may be acted on
-    iterations : that the solver took
+    usable : whether it may be applied
+    iterations : taken by the solver
     relaxation_gap : slack of the relaxation at the first second, relative; nan if there is none
     """
 
@@ -46,14 +46,14 @@ class Plan:
 
     @classmethod
     def none(cls, iterations: int = 0) -> "Plan":
-        """Return what a planner gives that has found no plan."""
+        """Return the result of a planner that has found no plan."""
         return cls(np.empty(0), np.empty(0), usable=False, iterations=iterations)
 
 
 def power_while_on_w(
     on_share: NDArray[np.float64], p_eng_w: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Power E / sigma that a mean power stands for; 0 where the engine will not run."""
+    """Power E / sigma while on, of a mean power E; 0 where the engine will not run."""
     runs = on_share >= ON_THRESHOLD
     power = np.zeros_like(p_eng_w)
     np.divide(p_eng_w, np.minimum(on_share, 1.0), out=power, where=runs)
@@ -63,12 +63,12 @@ def power_while_on_w(
 class Planner(ABC):
     """Plans the engine over the seconds ahead, once a second; `RecedingHorizon` does the rest.
 
-    A subclass writes `plan`. Where it raises nothing and returns an unusable plan, the ladder of
-    `RecedingHorizon` takes over.
+    A subclass implements `plan`. If it returns an unusable plan, the ladder of `RecedingHorizon`
+    takes over.
 
     Parameters
     ----------
-    trip : what the planner may look at: `trip.vehicle`, and the road ahead through
+    trip : data that the planner may use: `trip.vehicle`, and the trip ahead through
         `qpmpc.preview.StageBuilder`
     settings : of all controllers
 
@@ -86,28 +86,28 @@ class Planner(ABC):
         self.settings = settings or ControllerSettings()
 
     def depart(self, seen: Observation) -> None:  # noqa: B027
-        """Prepare the first plan before the trip starts, and forget any trip before."""
+        """Prepare the first plan before the trip starts, and forget any earlier trip."""
 
     @abstractmethod
     def plan(self, seen: Observation) -> Plan:
         """Plan from the measured state on."""
 
     def forget(self) -> None:  # noqa: B027
-        """Forget plan and warm start, as after a restart of the ECU on the road."""
+        """Forget plan and warm start, as after a restart of the ECU under way."""
 
 
 class RecedingHorizon(Controller):
     """Drives by a planner: its plan, else its last plan shifted, else the rules.
 
-    The rules watch every second, so that their timers are right if they have to take over. The
+    The rules are evaluated every second, so that their timers are right if they take over. The
     safety layer has the last word in any case.
 
     Parameters
     ----------
     trip : to be driven
     planner : made for the same trip; its forecast may be another one
-    settings : of all controllers; `rule_based` has the thresholds of the last rung. Those of the
-        planner if None
+    settings : of all controllers; `rule_based` has the thresholds of the last rung; the planner's
+        if None
 
     Raises
     ------
@@ -133,7 +133,7 @@ class RecedingHorizon(Controller):
         self._old_step = 0
 
     def depart(self, progress: Progress | None = None) -> None:
-        """Let the planner prepare its first plan."""
+        """Prepare the planner's first plan."""
         self._rules.reset()
         self._old = None
         self.planner.depart(self.trip.start)
@@ -152,7 +152,7 @@ class RecedingHorizon(Controller):
         return Decision(ruled.command, "rule-based", plan.iterations)
 
     def forget(self) -> None:
-        """Forget plan and warm start, as after a restart of the ECU on the road."""
+        """Forget plan and warm start, as after a restart of the ECU under way."""
         self.planner.forget()
         self._old = None
 
