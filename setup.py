@@ -2,7 +2,7 @@
 
 Everything else about the build is in pyproject.toml. The packages are found here because
 setuptools cannot find packages below a renamed folder from a static table. Folders of data count
-as packages too, as setuptools wants it.
+as packages too, as setuptools requires.
 """
 
 from setuptools import find_namespace_packages, setup

@@ -24,7 +24,7 @@ FLAGS = {1: "bad measurement", 2: "bad preview", 4: "solver failed", 8: "warming
 
 
 class Inputs(Protocol):
-    """Whatever fills in the C controller's input."""
+    """Fills in the C controller's input."""
 
     def fill(self, seen: Observation, into: Any) -> None:
         """Write all inputs of one step."""
@@ -36,7 +36,7 @@ class InputBuilder:
     Parameters
     ----------
     preview : cuts the trip into stages
-    truth : what the short horizon sees
+    truth : trace for the short horizon
     """
 
     def __init__(self, preview: StageBuilder, truth: Trace) -> None:
@@ -70,11 +70,11 @@ class GeneratedController(Controller):
     trip, settings : as of `Controller`
     of_qp : settings of the QP; those of `mh_qp` if None
     precision : of all arithmetic
-    name : under which results are reported
+    name : used in reports
 
     Attributes
     ----------
-    inputs : fills in what the C code is given each second; `ForecastInputs` does that in C too
+    inputs : fills in the C code's input each second; `ForecastInputs` does that in C
     fill_s, call_s : wall time of the last step, s: of filling in its input, and of the C call
 
     Raises
@@ -109,7 +109,7 @@ class GeneratedController(Controller):
         self._arguments = (self._state, ctypes.byref(self._in), ctypes.byref(self._out))
 
     def depart(self, progress: Progress | None = None) -> None:
-        """Set a defined state; prepare the first plan, unless the settings leave that out."""
+        """Set a defined state; prepare the first plan, unless the settings disable that."""
         self.forget()
         if self.of_qp.prepared:
             self.inputs.fill(self.trip.start, self._in)
@@ -142,7 +142,7 @@ class GeneratedController(Controller):
 
 
 def decision_of(out: Any) -> Decision:
-    """Return what an `mpc_out` says."""
+    """Return the content of an `mpc_out`."""
     planned = out.rung == 0
     return Decision(
         Command(bool(out.engine_on), float(out.p_eng_w)),

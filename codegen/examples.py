@@ -14,5 +14,5 @@ def example_files(target: str) -> dict[str, str]:
 
 
 def is_example(name: str) -> bool:
-    """Whether a file of a project is such a program and no part of the controller."""
+    """Whether a file of a project is such a program, not part of the controller."""
     return name in _OF_TARGET.values()

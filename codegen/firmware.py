@@ -1,4 +1,4 @@
-"""Firmware for a Cortex-M7: built with the ARM tool chain, run in QEMU, spoken to through pipes."""
+"""Firmware for a Cortex-M7: built with the ARM tool chain, run in QEMU, driven through pipes."""
 
 import ctypes
 import os
@@ -25,11 +25,11 @@ COMPILER, SIZE, NM, QEMU = (
 )
 PACKAGES = "gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm make"
 TIMER_HZ = 25_000_000
-ICOUNT_SHIFT = 6  # 2^6 ns of the machine's time an instruction
+ICOUNT_SHIFT = 6  # 2^6 ns of the machine's time per instruction
 INSTRUCTIONS_A_TICK = 1e9 / TIMER_HZ / 2**ICOUNT_SHIFT
 STACK_RESERVED_BYTES = 4096  # in cortex_m7.ld
 ANSWER_TIMEOUT_S = 300.0
-LOOK_EVERY_S = 0.2  # whether QEMU is still there
+LOOK_EVERY_S = 0.2  # whether QEMU is still running
 _INIT, _DEPART, _STEP, _STOP = range(4)
 
 
@@ -62,7 +62,7 @@ class Footprint:
     ----------
     flash : code, constants and initial values, start-up and test harness included
     ram_static : variables, harness included, without stack
-    state : of those, one controller's memory
+    state : memory of one controller, part of `ram_static`
     stack_frames : largest stack of the controller by its call graph, see `stack_of`
     """
 
@@ -79,7 +79,7 @@ def build_firmware(
     Raises
     ------
     CodegenError
-        If a tool is missing or the compiler fails, for instance because it does not fit.
+        If a tool is missing or the compiler fails, for example because it does not fit.
     """
     require_tools()
     generate(values, folder, "cortex-m7", precision, algorithm)
@@ -92,7 +92,7 @@ def make_firmware(folder: Path, *options: str) -> Path:
     Raises
     ------
     CodegenError
-        If the compiler fails, for instance because it does not fit.
+        If the compiler fails, for example because it does not fit.
     """
     command = ["make", "--silent", "-C", str(folder), *options]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -169,12 +169,12 @@ def _calls(elf: Path) -> dict[str, set[str]]:
 
 @dataclass(frozen=True)
 class Answer:
-    """What the target says to one request.
+    """The target's answer to one request.
 
     Attributes
     ----------
     result : of the function called
-    instructions : that it took, measured on the target
+    instructions : taken by it, measured on the target
     stack_bytes : most stack ever used, painted on the target
     state_bytes : memory of one controller
     out : the `mpc_out` structure

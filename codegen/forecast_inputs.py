@@ -29,7 +29,7 @@ class Road:
         self._pointer, self._type, self.steps = pointer, MpcRoad, trace.steps
 
     def after(self, step: int) -> Any:
-        """Return the road from a second on to its end."""
+        """Return the road from a second to its end."""
         left = max(self.steps - step, 0)
         start = (self.steps - left) * self._bytes
         at = [ctypes.addressof(array) + start for array in self._arrays]
@@ -43,8 +43,8 @@ class ForecastInputs:
     Parameters
     ----------
     library : of the controller
-    truth : what the short horizon sees
-    forecast : what the long horizon sees; None: what the short one sees too
+    truth : trace for the short horizon
+    forecast : trace for the long horizon; `truth` if None
 
     Raises
     ------

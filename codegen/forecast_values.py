@@ -1,4 +1,4 @@
-"""Numbers with which the C code makes the long horizon's statistics from a forecast of the trip."""
+"""Numbers for the C code that makes the long horizon's statistics from a forecast of the trip."""
 
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.vehicle.parameters import Vehicle
@@ -14,5 +14,5 @@ def forecast_scalars(vehicle: Vehicle, horizon: HorizonSettings) -> dict[str, fl
 
 
 def fixed_block_s(horizon: HorizonSettings) -> int:
-    """Return the length of a block, s; 0 where the length of the trip sets it."""
+    """Return the length of a block, s; 0 if the length of the trip sets it."""
     return 0 if horizon.blocks else horizon.block_s

@@ -25,7 +25,7 @@ Algorithm = Literal["admm", "osqp"]
 PRECISIONS: tuple[Precision, ...] = ("f32", "f64")
 TARGETS: tuple[Target, ...] = ("host", "cortex-m7")
 ALGORITHMS: tuple[Algorithm, ...] = ("admm", "osqp")
-# Flash and RAM of the firmware: what does not fit does not link. For the algorithm written for this
+# Flash and RAM of the firmware: larger firmware does not link. For the algorithm written for this
 # problem the project's budget; OSQP takes more, see docs/embedded.md.
 MEMORY_KB: dict[tuple[Algorithm, Precision], tuple[int, int]] = {
     ("admm", "f32"): (128, 96),

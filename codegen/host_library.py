@@ -33,7 +33,7 @@ _ABI_NAMES = (
     "offset of short_count",
     "offset of engine_on",
 )
-# -w: a warning that a new compiler invents must not stop a user; the tests see to warnings
+# -w: a new compiler's warnings must not stop a user; the tests check warnings
 FLAGS = (
     "-O3 -std=c99 -w -ffp-contract=off -fPIC -shared -Wl,-Bsymbolic "
     "-Iosqp -Iosqp/inc/public -Iosqp/inc/private"
@@ -208,8 +208,8 @@ def _build(files: Mapping[str, str], command: str, kept: Path) -> None:
         )
         made = folder / "libmpc.so"
         if result.returncode or not _loads(made):
-            first = next(iter(result.stderr.strip().splitlines()), "no library came of it")
+            first = next(iter(result.stderr.strip().splitlines()), "no library was built")
             raise CodegenError(
-                f"C compiler {command} failed: {first}; mh_qp.implementation=python does without"
+                f"C compiler {command} failed: {first}; mh_qp.implementation=python needs none"
             )
         made.replace(kept)

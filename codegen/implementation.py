@@ -14,7 +14,7 @@ SLOWER = "steps take several times longer (mh_qp.implementation=python says that
 
 
 def mh_qp(trip: Trip, settings: ControllerSettings | None = None) -> Controller:
-    """Make `mh-qp` in the implementation that the settings ask for."""
+    """Make `mh-qp` in the implementation that is set."""
     settings = settings or ControllerSettings()
     return _made("mh-qp", trip, settings, settings.mh_qp)
 
@@ -26,12 +26,12 @@ def mh_qp_paper(trip: Trip, settings: ControllerSettings | None = None) -> Contr
 
 
 def _made(name: str, trip: Trip, settings: ControllerSettings, of_qp: MhQpSettings) -> Controller:
-    """Make a controller in C or Python; where `auto` has to fall back, it says why.
+    """Make a controller in C or Python; a fallback of `auto` is reported with its reason.
 
     Raises
     ------
     InputError, CodegenError
-        If C is asked for and cannot be had.
+        If C is set and not available.
     """
     reason = ""
     if of_qp.implementation != "python":

@@ -17,7 +17,7 @@ from qpmpc.solvers.osqp import SAME_WORK
 
 PREFIX = "mpc_osqp_"
 FOLDER = "osqp"
-# Arrays that OSQP never writes to: they belong in flash, though it declares them as variables.
+# Arrays that OSQP never writes to: they belong in flash, although declared as variables.
 CONSTANT_ARRAYS = (
     "data_P_csc_p",
     "data_P_csc_i",
@@ -33,8 +33,8 @@ CONSTANT_ARRAYS = (
     "linsys_Lnz",
 )
 # Residuals are compared with this, so that every finite result counts as solved and no search for
-# a certificate of infeasibility is begun: the same work every step. What is usable is decided by
-# the controller, which looks at the numbers themselves.
+# a certificate of infeasibility starts: the same work every step. The controller decides from the
+# numbers themselves whether a result is usable.
 ANY_RESIDUAL = 1e20
 NAMES = {"rho": "rho", "sigma": "proximal_weight"}  # as settings
 DECIMALS = 20  # of numbers in the code that OSQP generates
@@ -44,7 +44,7 @@ def osqp_files(values: Values, precision: str) -> dict[str, str]:
     """Return OSQP's sources, configuration, workspace and licence, by name.
 
     Embedded mode 2 (vectors and matrices are updated), no output, no clock, no interrupts.
-    The sources are copied as they are; the date is taken out of what OSQP generates.
+    The sources are copied unchanged; the date is removed from the files that OSQP generates.
 
     Raises
     ------

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from qpmpc.errors import InputError
 
 FORM = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}")
-# OSQP's own sources are used as they come: their names do not begin with mpc_.
+# OSQP's own sources are used unmodified: their names do not begin with mpc_.
 AS_THEY_COME = ("osqp/src/", "osqp/inc/", "osqp/LICENSE")
 # where a name begins: mpc_step, mpc.h, libmpc.so, MPC_SHORT, -DMPC_NATIVE_MINMAX
 _NAME = re.compile(r"\b(?=mpc_|mpc\.h\b)|(?<=\blib)(?=mpc\.so\b)")
@@ -18,7 +18,7 @@ _MACRO = re.compile(r"(?:\b|(?<=-D))(?=MPC_)")
 
 
 def checked_prefix(prefix: str) -> str:
-    """Return the prefix if it can begin a name in C; an empty one stands for none.
+    """Return the prefix if it can begin a name in C; an empty one means no prefix.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The numbers of one generated controller: sizes, parameters and tables, as the runtime wants."""
+"""The numbers of one generated controller: sizes, parameters and tables, as in the runtime."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ from qpmpc.vehicle.parameters import Vehicle
 EQUALITY_RHO_FACTOR = 1000.0  # OSQP's own, on rows whose bounds are closer than the next figure
 EQUALITY_WIDTH = 1e-4  # solver units
 
-# What the C code has in common with the Python controller, by module: names in C and their values.
+# Constants common to the C code and the Python controller, by module: names in C.
 CONSTANTS: dict[str, dict[str, float]] = {
     module.__name__: {name: getattr(module, name) for name in names.split()}
     for module, names in (
@@ -44,7 +44,7 @@ CONSTANTS: dict[str, dict[str, float]] = {
 
 @dataclass(frozen=True)
 class Sizes:
-    """What fixes the dimensions of a generated controller.
+    """The dimensions of a generated controller.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class Sizes:
 
 @dataclass(frozen=True)
 class Values:
-    """Everything that a generated controller is made of.
+    """All numbers of a generated controller.
 
     Attributes
     ----------
@@ -88,10 +88,10 @@ class Values:
     sizes : dimensions
     scalars, arrays : members of the runtime's `mpc_model`
     iterations, departure_iterations : K of a step and of each linearisation before the trip
-    departure_linearisations, plan_valid_steps, warm_up_steps : as the Python controller has them
+    departure_linearisations, plan_valid_steps, warm_up_steps : as in the Python controller
     duration_exponent : of the column scaling
     min_on_s : shortest engine run of the rules
-    block_s : length of a block; 0 where the trip's length sets it
+    block_s : length of a block; 0 if the trip's length sets it
     """
 
     vehicle: str
@@ -118,13 +118,13 @@ def values_of(
     vehicle : parameters
     settings : of the controller; its `prepared` concerns the caller of the C code
     rules : thresholds of the last rung of the ladder
-    blocks : of the long horizon; needed where the settings cut the trip by length of a block
+    blocks : of the long horizon; needed if the settings give the length of a block
 
     Raises
     ------
     InputError
         If there is no long horizon, its number of blocks is open, the terminal band is so narrow
-        that the solver would take it for an equality, or a setting is one of Python's solvers.
+        that the solver would treat it as an equality, or a setting is one of Python's solvers.
     """
     _refuse_unknown(settings)
     model = PwaModel.of(vehicle, settings.pwa)
@@ -185,7 +185,7 @@ def values_of(
 def _refuse_unknown(settings: MhQpSettings) -> None:
     """Refuse the settings that generated code does not have."""
     if settings.solver is not None:
-        raise InputError(f"generated C has a solver of its own, not mh_qp.solver={settings.solver}")
+        raise InputError(f"generated C has its own algorithm, not mh_qp.solver={settings.solver}")
     if settings.admm.status_tolerance != AdmmSettings().status_tolerance:
         raise InputError("generated C has no mh_qp.admm.status_tolerance: it never stops early")
 

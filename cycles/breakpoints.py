@@ -13,8 +13,8 @@ KMH_PER_MPS = 3.6
 def read_breakpoints(path: Path, parts: Sequence[str], *, name: str) -> Cycle:
     """Drive `parts` one after the other and sample the speed at 1 Hz.
 
-    The last breakpoint of a part is the first of the next: both are at the same instant and must
-    have the same speed.
+    The last breakpoint of a part is the first of the next: both have the same time and must have
+    the same speed.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ SI_PER_UNIT = {"s": 1.0, "km": 1000.0, "mi": 1609.344, "km/h": 1 / 3.6, "mph": 0
 
 
 class Figure(NamedTuple):
-    """A published figure with the digits it was printed with, such as ``7.1 mph``."""
+    """A published figure with its printed digits, such as ``7.1 mph``."""
 
     value: Decimal
     unit: str
@@ -40,7 +40,7 @@ class Figure(NamedTuple):
     def rounding_si(self) -> float:
         """Half a unit of the last printed digit, in s, m or m/s."""
         exponent = self.value.as_tuple().exponent
-        assert isinstance(exponent, int)  # a string stands for NaN and infinity
+        assert isinstance(exponent, int)  # a string would mean NaN or infinity
         return 0.5 * 10.0**exponent * SI_PER_UNIT[self.unit]
 
     def __str__(self) -> str:
@@ -77,11 +77,11 @@ class CatalogueEntry(_Strict):
     source
         The document that defines the cycle.
     licence
-        What is known of its legal status.
+        Its legal status, as far as known.
     note
-        Anything a user must know, such as an interpretation of ours.
+        Anything that a user must know, such as our interpretation.
     published
-        Statistics to check the file against; None where nobody publishes any.
+        Statistics to check the file against; None if none are published.
     """
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9-]+$")]

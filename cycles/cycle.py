@@ -46,8 +46,8 @@ class Cycle:
     Raises
     ------
     InputError
-        If the arrays differ in shape, hold values that are not finite or negative speeds, or the
-        grid is another one.
+        If the arrays differ in shape, have values that are not finite or negative speeds, or the
+        grid differs.
     """
 
     name: str
@@ -79,7 +79,7 @@ class Cycle:
     ) -> Self:
         """Interpolate samples linearly at 0, 1, 2, .. seconds after the first one.
 
-        What remains after the last whole second is dropped.
+        The part after the last whole second is dropped.
 
         Parameters
         ----------

@@ -12,7 +12,7 @@ from qpmpc.cycles.read_csv import read_csv
 from qpmpc.errors import InputError
 from qpmpc.names import Names, Shipped
 
-# an added name leads to a Cycle, or to the path of a CSV file
+# the target of an added name is a Cycle, or the path of a CSV file
 CYCLES = Names(
     "cycle",
     {entry.name: Shipped(entry.data) for entry in catalogue()},
@@ -28,12 +28,12 @@ def load_cycle(name_or_path: str | os.PathLike[str]) -> Cycle:
     Parameters
     ----------
     name_or_path
-        One of `cycle_names`, or a file. A shipped name wins over a file of that name.
+        One of `cycle_names`, or a file. A shipped name has priority over a file of that name.
 
     Raises
     ------
     InputError
-        If it is neither, or the file cannot be used; one line says why and what is allowed.
+        If it is neither, or the file cannot be used; one line with the reason and what is allowed.
     """
     name = os.fspath(name_or_path)
     for entry in catalogue():

@@ -1,4 +1,4 @@
-"""Whether this is the motion of a road vehicle, in the units it claims to be in."""
+"""Whether this is the motion of a road vehicle, in the stated units."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,7 +9,7 @@ from qpmpc.cycles.cycle import Cycle, Floats
 from qpmpc.errors import InputError
 
 SPEED_MAX_MPS = 70.0
-"""252 km/h: no car of the kind modelled here gets near it."""
+"""252 km/h: far beyond any car of the kind modelled here."""
 
 ACCEL_MAX_MPS2 = 10.0
 """About 1 g, over a whole second: beyond the grip of road tyres either way."""
@@ -18,11 +18,11 @@ GRADE_MAX = 0.3
 """The steepest public streets are just above it; a larger number is most likely in percent."""
 
 GAP_MAX_S = 10.0
-"""Longest hole that is filled by a straight line.
+"""Longest gap that is filled by a straight line.
 
 A logger's dropout in a tunnel lasts some seconds; over a longer one a straight line would hide
 whole stops and their fuel. Where the speed is the same at both ends, as when the logger sleeps
-while the car stands, the straight line is what happened.
+while the car stands, the straight line is correct.
 """
 
 GAP_SPEED_CHANGE_MPS = 0.5
@@ -34,8 +34,8 @@ POWER_P95_MAX_WPKG = 35.0
 
 By the same statistic the EU's real driving emissions test (Regulation (EU) 2017/1151, Annex IIIA)
 refuses aggressive driving, above 14 to 29 W/kg depending on the mean speed. The shipped cycles have
-8 to 13 W/kg, the aggressive US06 schedule of the EPA 26. To call km/h metres a second multiplies it
-by 3.6^2 = 13, to call mph so by 5: the shipped cycles then have at least 41.
+8 to 13 W/kg, the aggressive US06 schedule of the EPA 26. Reading km/h as m/s multiplies it by
+3.6^2 = 13, reading mph as m/s by 5: the shipped cycles then have at least 41.
 """
 
 POWER_SECONDS_MIN = 60
@@ -90,7 +90,7 @@ def check_samples(
         (step_s > GAP_MAX_S) & (np.abs(np.diff(speed_mps)) > GAP_SPEED_CHANGE_MPS),
         step_s,
         f"{{:g}} s without a sample, at most {GAP_MAX_S:g} s are allowed unless the speed is the "
-        "same before and after: what happened in between is not known",
+        "same before and after: the motion in between is not known",
     )
     duration_s = time_s[-1] - time_s[0]
     if not DURATION_MIN_S <= duration_s <= DURATION_MAX_S:
@@ -109,7 +109,7 @@ def check_motion(path: Path, lines: Sequence[int], time_s: Floats, cycle: Cycle)
     path, lines, time_s
         For the message: the file, and line and time of each sample. Shape (m,).
     cycle
-        The drive at 1 Hz: noise between its points does not count.
+        The drive at 1 Hz: noise between its points is ignored.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def check_motion(path: Path, lines: Sequence[int], time_s: Floats, cycle: Cycle)
         if power_wpkg > POWER_P95_MAX_WPKG:
             raise InputError(
                 f"{path}: one accelerating second in twenty takes over {power_wpkg:.0f} W/kg, "
-                f"on the road that is at most {POWER_P95_MAX_WPKG:g}; the speeds look like km/h or "
+                f"in real driving at most {POWER_P95_MAX_WPKG:g}; the speeds look like km/h or "
                 f"mph: {TO_MPS}"
             )
     moving = speed > 0
@@ -150,7 +150,7 @@ def _refuse(
     values: Floats,
     message: str,
 ) -> None:
-    """Raise at the first bad sample; `message` has a place for its value."""
+    """Raise at the first bad sample; `message` has a placeholder for its value."""
     if np.any(bad):
         k = int(np.argmax(bad))
         raise InputError(f"{path}, line {lines[k]}: {message.format(values[k])}")

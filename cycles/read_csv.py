@@ -1,4 +1,4 @@
-"""Import of a user's drive from CSV, with one clear line about whatever is wrong with it."""
+"""Import of a user's drive from CSV, with one clear line about any error."""
 
 import csv
 import re
@@ -14,7 +14,7 @@ REQUIRED = ("time_s", "speed_mps")
 OPTIONAL = ("grade",)
 ALLOWED_TEXT = "time_s,speed_mps[,grade]"
 
-# Columns in a wrong unit: what gives them away, how to convert them, and to which column.
+# Columns in a wrong unit: the pattern of their names, the conversion, and the right column.
 CONVERSIONS = (
     (re.compile(r"km/?h|kph|kmph", re.I), "divide km/h by 3.6", "speed_mps"),
     (re.compile(r"mph|mi/h", re.I), "multiply mph by 0.44704", "speed_mps"),
@@ -41,9 +41,9 @@ def read_csv(path: Path, *, name: str | None = None) -> Cycle:
     ------
     InputError
         One line that names the file, the line and what is allowed: unreadable file, columns other
-        than the above, values that are no numbers or out of range, time that does not increase,
-        a gap, a trip too short or too long, or motion no road vehicle is capable of, as when
-        speeds in km/h or mph are called m/s (see `qpmpc.cycles.plausibility`).
+        than the above, values that are not numbers or out of range, time that does not increase,
+        a gap, a trip too short or too long, or motion that no road vehicle is capable of, as when
+        speeds in km/h or mph are given as m/s (see `qpmpc.cycles.plausibility`).
     """
     rows = _rows(path)
     if not rows:

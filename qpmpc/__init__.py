@@ -1,7 +1,7 @@
 """Multi-horizon MPC, posed as a QP, for the power and thermal management of hybrid cars.
 
-Everything public is here; each name is imported when it is first used, so that importing the
-package costs nothing.
+All public names are here; each is imported on first use, so that importing the package costs
+nothing.
 """
 
 from importlib import import_module
@@ -63,7 +63,7 @@ __all__ = [*_HOME]
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name when it is first asked for."""
+    """Import a public name on first use."""
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

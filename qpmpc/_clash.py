@@ -6,7 +6,7 @@ from importlib.metadata import PackageNotFoundError, distribution
 def refuse_other_qpmpc() -> None:
     """Raise if the unrelated PyPI distribution ``qpmpc`` is installed too.
 
-    Both distributions write into the same folder ``qpmpc``, so whichever came second has
+    Both distributions write into the same folder ``qpmpc``, so the one installed second has
     overwritten files of the first and neither can be trusted.
 
     Raises

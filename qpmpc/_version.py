@@ -1,3 +1,3 @@
-"""The version, in a module of its own: whoever needs it need not import the public face."""
+"""The version, in a separate module: reading it does not import the public interface."""
 
 __version__ = "0.1.0"

@@ -23,12 +23,12 @@ def drive(
 
     Parameters
     ----------
-    trip : whose cycle is the truth
+    trip : its cycle is the truth
     controller : made for this trip, and not used since
     on_step : called as on_step(observation, decision) after each decision, before the plant moves;
         its time does not count as the controller's
-    progress : called as progress(steps done, steps in all); before that, of a controller that
-        takes long to depart, as it counts
+    progress : called as progress(steps done, steps in all); before that, if a controller takes
+        long to depart, with the controller's own count
 
     Raises
     ------

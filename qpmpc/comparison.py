@@ -1,4 +1,4 @@
-"""Several controllers on several cycles: run them, set them against each other, report."""
+"""Several controllers on several cycles: run them, compare them, report."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -26,7 +26,7 @@ from qpmpc.vehicle import Vehicle
 
 DEFAULT_CONTROLLERS = ("rule-based", "mh-qp-paper", "mh-qp")
 PRINTED_WIDTH = 200
-ONE = (str, type, Controller, Planner)  # what is one controller, not several
+ONE = (str, type, Controller, Planner)  # one controller, not several
 
 
 class Runs(Sequence[Run]):
@@ -60,7 +60,7 @@ class Runs(Sequence[Run]):
         return compare_runs(self._runs)
 
     def remarks(self) -> list[str]:
-        """Return what a reader of the table must know, a line each."""
+        """Return the notes that a reader of the table needs, one line each."""
         said = dict.fromkeys(remark for run in self._runs for remark in run.remarks)
         return [*notes(self.rows()), *said]
 
@@ -111,7 +111,7 @@ def compare(
     ----------
     cycles, controllers : one or several, each as `simulate` takes it
     vehicle, settings : as of `simulate`
-    next_job : called with the title of each run; returns where it reports its progress
+    next_job : called with the title of each run; returns the function that takes its progress
 
     Raises
     ------
@@ -129,11 +129,11 @@ def compare(
             raise InputError(f"cycle {trip.cycle.name!r} is named twice")
         trips.append(trip)
     _one_vehicle([trip.vehicle for trip in trips])
-    # before any run, so that what does not fit is refused then
+    # before any run, so that wrong settings are refused in time
     of_first = [make_controller(what, trip, chosen) for trip in trips[:1] for what in wanted]
     remark_idle_settings(of_first, settings, wanted)
     runs = []
-    for trip in trips:  # one after the other, so that step times are not disturbed
+    for trip in trips:  # one after the other, so that step times are not affected
         for i, what in enumerate(wanted):
             name = what if isinstance(what, str) else what.name
             report = next_job(f"{trip.cycle.name}, {name}") if next_job is not None else None

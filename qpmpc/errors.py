@@ -1,4 +1,4 @@
-"""The exceptions of qpmpc: one base class, so that callers need to catch one thing."""
+"""The exceptions of qpmpc, with one base class for callers to catch."""
 
 
 class QpmpcError(Exception):
@@ -8,6 +8,6 @@ class QpmpcError(Exception):
 class InputError(QpmpcError):
     """A file, value or option given by the user cannot be used.
 
-    The message is one line: it names the offender and says what is allowed.
+    The message is one line: it names the wrong input and what is allowed.
     The command line prints it and exits with code 2.
     """

@@ -1,4 +1,4 @@
-"""Writing results: checked before the work, complete or not there at all after it."""
+"""Writing results: checked before the work; afterwards files are complete or absent."""
 
 import json
 import os
@@ -14,12 +14,12 @@ def check_folder(folder: Path, option: str) -> None:
     Parameters
     ----------
     folder : existing, or to be made with its parents
-    option : that named it, for the error
+    option : option that named it, for the error
 
     Raises
     ------
     InputError
-        If it or the nearest existing parent is no directory or cannot be written to.
+        If it or the nearest existing parent is not a directory or cannot be written to.
     """
     nearest = folder
     while not nearest.exists():
@@ -67,6 +67,6 @@ def json_text(data: Any) -> str:
     Raises
     ------
     ValueError
-        If a number is not finite: JSON has none such.
+        If a number is not finite: JSON does not allow it.
     """
     return json.dumps(data, indent=2, allow_nan=False, ensure_ascii=False) + "\n"

@@ -15,12 +15,12 @@ from qpmpc.remarks import say_once
 
 @dataclass(frozen=True)
 class Shipped:
-    """Where a shipped name leads, and what it needs beyond the core.
+    """The target of a shipped name, and its requirements beyond the core.
 
     Attributes
     ----------
     target : ``module:attribute``, imported when the name is used
-    module, extra : package without which it cannot work, and the extra that brings it
+    module, extra : package that it requires, and the extra that installs it
     settings : ``module:attribute`` of the model of its settings, if it has any of its own
     """
 
@@ -33,7 +33,7 @@ class Shipped:
 class Names:
     """One kind of name.
 
-    Another package adds names by entry points of the group ``qpmpc.KINDs``, for instance in its
+    Another package adds names by entry points of the group ``qpmpc.KINDs``, for example in its
     pyproject.toml::
 
         [project.entry-points."qpmpc.controllers"]
@@ -43,9 +43,9 @@ class Names:
 
     Parameters
     ----------
-    kind : what the names name, in the singular
+    kind : the kind, in the singular
     shipped : the names of this package, the default first
-    also : what else a user may give, for the error message
+    also : other allowed inputs, for the error message
     """
 
     def __init__(self, kind: str, shipped: Mapping[str, Shipped], also: str = "") -> None:
@@ -85,7 +85,7 @@ class Names:
             )
 
     def find(self, name: str) -> Any:
-        """Import what a name stands for.
+        """Import the target of a name.
 
         Raises
         ------
@@ -106,11 +106,11 @@ class Names:
             ) from error
 
     def unknown(self, name: str) -> str:
-        """Return what to say of a name that is not known."""
+        """Return the error message for an unknown name."""
         return unknown(self.kind, name, self.names(), self._also)
 
     def settings_model(self, name: str) -> Any:
-        """Return the pydantic model of what a name can be set to, None if there is none."""
+        """Return the pydantic model of a name's settings, None if there is none."""
         if name in self.shipped:
             target = self.shipped[name].settings
             return _load(target) if target else None
@@ -123,7 +123,7 @@ def _load(target: str) -> Any:
 
 
 def unknown(kind: str, name: str, allowed: tuple[str, ...], also: str = "") -> str:
-    """Return what to say of an unknown name: the nearest known one and all others."""
+    """Return the message for an unknown name: the nearest known one and all others."""
     near = difflib.get_close_matches(name, allowed, n=1)
     hint = f", did you mean {near[0]!r}?" if near else ":"
     return f"unknown {kind} {name!r}{hint} use one of {', '.join(allowed)}{also}"

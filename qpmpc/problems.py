@@ -1,4 +1,4 @@
-"""Everything that is wrong with a set of parameters, in one line of bounded length."""
+"""All errors in a set of parameters, in one line of bounded length."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -7,8 +7,8 @@ from difflib import get_close_matches
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-SHOWN = 8  # problems of one sort; a file with more is not the one that was meant
-LONGEST = 60  # characters of a key or value that are repeated
+SHOWN = 8  # problems of one sort; a file with more is probably the wrong one
+LONGEST = 60  # characters of a key or value that are shown
 
 # pydantic's messages about Python's types, in the words of a TOML file
 _WORDS = {
@@ -22,7 +22,7 @@ _WORDS = {
 def problems_line(
     error: ValidationError, model: type[BaseModel], owner: str, origins: Mapping[str, str]
 ) -> str:
-    """Say what is missing, what is unknown and which values are wrong.
+    """Return which keys are missing, which unknown and which values wrong.
 
     For example ``my.toml: missing battery.soc_min; unknown chassis.mas_kg (did you mean
     chassis.mass_kg?); trip.eta_eq: must be less than 1 (given: 2)``.
@@ -31,7 +31,7 @@ def problems_line(
     ----------
     error : of `model`
     owner : the file or thing that the line begins with
-    origins : dotted key -> the file it stands in; said where that is not the owner
+    origins : dotted key -> its file; named where that is not the owner
     """
     found = error.errors()
     places = [each["loc"] for each in found]
@@ -58,7 +58,7 @@ def shown_value(value: object) -> str:
     """Return a value as a TOML file has it, cut where it is long."""
     try:
         return _cut(str(value).lower() if isinstance(value, bool) else repr(value))
-    except ValueError:  # Python writes no whole number of more than some thousand digits
+    except ValueError:  # Python prints no integer of more than some thousand digits
         return "a number too long to show"
 
 
@@ -69,7 +69,7 @@ def _wrong(each: ErrorDetails, key: str, owner: str, origins: Mapping[str, str])
     given = each["input"]
     if isinstance(given, str | float | int):
         text += f" (given: {shown_value(given)})"
-    # A check of several keys together names them in its message: each may stand elsewhere.
+    # A check of several keys together names them in its message: each may be in another file.
     prefix = f"{key}." if key else ""
     named = dict.fromkeys(prefix + word for word in re.findall(r"\w+(?:\.\w+)*", text))
     elsewhere = [f"{n}{_origin(n, owner, origins)}" for n in named if _origin(n, owner, origins)]
@@ -99,7 +99,7 @@ def _origin(key: str, owner: str, origins: Mapping[str, str]) -> str:
 
 
 def _suggestion(model: type[BaseModel], loc: tuple[int | str, ...]) -> str:
-    """Name the key that may have been meant: in the same table if one is near, else in another."""
+    """Suggest a key: in the same table if one is near, else in another."""
     *parents, last = (str(part) for part in loc)
     here = _model_at(model, tuple(parents)) if parents else model
     for name in get_close_matches(last, here.model_fields if here else (), n=1):

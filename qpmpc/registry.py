@@ -1,4 +1,4 @@
-"""The top floor: every name a user can type, and what it leads to.
+"""The top layer: every name that a user can type, and its target.
 
 Another package adds controllers, planners, solvers, vehicles, cycles and checks by entry points,
 see `Names`; ``docs/extending.md`` shows how.
@@ -105,7 +105,7 @@ def make_controller(
     Parameters
     ----------
     what : a name, a class of controllers or planners, or one made for this trip already
-    trip, settings : what it is made of
+    trip, settings : that it is made with
 
     Raises
     ------
@@ -159,7 +159,7 @@ def split_settings(
     Parameters
     ----------
     settings : as of ``--set``
-    controllers : that will run; an own controller's section is known by its class
+    controllers : that will run; a user's own controller gives its section by its class
 
     Raises
     ------
@@ -203,7 +203,7 @@ def check_sections(
             )
         if model is None:
             raise InputError(f"controller {section.replace('_', '-')!r} has no settings of its own")
-        settings.of(section, model())  # refuses what does not fit
+        settings.of(section, model())  # refuses wrong settings
 
 
 def without_effect(settings: Mapping[str, object], controllers: Sequence[ControllerLike]) -> str:

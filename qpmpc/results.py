@@ -1,4 +1,4 @@
-"""Results of a run: trajectories, the figures drawn from them, JSON."""
+"""Results of a run: trajectories, the figures computed from them, JSON."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -14,13 +14,13 @@ from qpmpc.vehicle.plant import PlantState, StepFlows
 
 Floats = NDArray[np.float64]
 
-REFERENCE, OPTIMUM = "rule-based", "dp"  # controllers that others are compared with
+REFERENCE, OPTIMUM = "rule-based", "dp"  # controllers that the others are compared with
 COMPARABLE_SHARE = 0.03  # largest SOC correction, as a share of fuel, of a comparable run
 
 
 @dataclass
 class Trajectory:
-    """A run second by second; states have one entry more than steps.
+    """A run second by second; states have one more entry than steps.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Run:
     ----------
     cycle, controller, solver : names; solver is empty where there is none
     implementation : language that the controller ran in
-    remarks : what a user should know of the choices made for this run, a line each
+    remarks : what a user should know about the choices made for this run, one line each
     vehicle : parameters, overrides included
     trajectory : second by second
     """
@@ -181,12 +181,12 @@ def _max(values: Floats) -> float | None:
 
 
 def compare_runs(runs: Sequence[Run]) -> list[dict[str, Any]]:
-    """Return the summary of each run, set against the others on its cycle.
+    """Return the summary of each run, compared with the others on its cycle.
 
     saving_vs_rule_percent = 100 (1 - m / m_rule),   fuel_above_dp_percent = 100 (m / m_dp - 1)
 
     with m the SOC-balanced fuel. Null where there is no such run on the cycle, or it burns
-    nothing. `comparable` of a run says whether its own m can be trusted (see `Run`).
+    nothing. `comparable` of a run tells whether its own m can be trusted (see `Run`).
     """
     balanced = {(run.cycle, run.controller): run.fuel_soc_balanced_g for run in runs}
 

@@ -24,8 +24,8 @@ def load_toml(text: str, owner: str) -> dict[str, Any]:
     """
     try:
         return tomllib.loads(text)
-    # Besides its own error the parser lets through those of numbers with thousands of digits and
-    # of arrays nested as deep.
+    # Besides its own error the parser passes on those of numbers with thousands of digits and of
+    # arrays nested thousands deep.
     except (ValueError, RecursionError) as error:
         raise InputError(f"{owner}: not valid TOML: {error}") from error
 
@@ -41,7 +41,7 @@ def validated(
     Parameters
     ----------
     owner : names the data in the error
-    origins : dotted key -> the file it stands in, for keys that are not the owner's own
+    origins : dotted key -> its file, for keys that are not the owner's own
 
     Raises
     ------
@@ -73,7 +73,7 @@ def parse_setting(text: str) -> tuple[str, object]:
 
 
 def parse_settings(texts: list[str]) -> dict[str, object]:
-    """Parse several ``key=value`` texts; a later one wins over an earlier one.
+    """Parse several ``key=value`` texts; a later one overrides an earlier one.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def apply_settings(data: dict[str, Any], settings: dict[str, object], owner: str
             place = inner
         if last not in place or isinstance(place[last], dict):
             raise _unknown(dotted, last, place, owner)
-        # numpy's numbers and arrays count as Python's, which strict models ask for
+        # numpy's numbers and arrays become Python's, which strict models require
         place[last] = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
     return result
 

@@ -1,4 +1,4 @@
-"""The calls that most users make: simulate one run, by names or objects alike."""
+"""The usual entry point: simulate one run, given names or objects."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -45,13 +45,13 @@ def simulate(
     controller : a name, a class of controllers or planners, or one made for this trip
     vehicle : a shipped name, a TOML file or a `Vehicle`; the default one if None
     settings : of vehicle and controllers by dotted name, e.g. ``{"thermal.t_amb_degc": -15}``
-    forecast : what the long horizon sees instead of the truth
+    forecast : for the long horizon, instead of the truth
     on_step, progress : see `drive`
 
     Raises
     ------
     InputError
-        If a name, a file or a setting cannot be used; one line says why and what is allowed.
+        If a name, a file or a setting cannot be used; one line with the reason and what is allowed.
     QpmpcError
         If the controller given belongs to another trip or has driven already.
     """
@@ -70,7 +70,7 @@ def prepared(
     Raises
     ------
     InputError
-        If a name or value is not allowed, or has no effect on a controller made already.
+        If a name or value is not allowed, or has no effect on an existing controller.
     """
     of_vehicle: dict[str, object] = {}
     if isinstance(settings, Mapping):

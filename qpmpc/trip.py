@@ -1,4 +1,4 @@
-"""One trip: a cycle, the vehicle that drives it, and what is known of it in advance."""
+"""One trip: a cycle, the vehicle that drives it, and its forecast."""
 
 import os
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from qpmpc.vehicle import DEFAULT_VEHICLE, Plant, PlantState, Vehicle, load_vehi
 
 
 class Observation(NamedTuple):
-    """What is measured at the start of a step; demand and speed are those of the coming second."""
+    """Measurements at the start of a step; demand and speed are those of the coming second."""
 
     step: int
     soc: float
@@ -31,8 +31,8 @@ class Trip:
     ----------
     cycle : a name or CSV file as `load_cycle` takes it, or a cycle
     vehicle : a name or TOML file as `load_vehicle` takes it, or a vehicle
-    forecast : demand and speed as the long horizon sees them, or a cycle of which they are
-        computed; the truth if None. Its length may differ from the trip's.
+    forecast : demand and speed for the long horizon, or a cycle from which they are computed; the
+        truth if None. Its length may differ from the trip's.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Trip:
         return len(self._demand_w)
 
     def observation(self, step: int, state: PlantState) -> Observation:
-        """Return what a controller is shown at the start of a step.
+        """Return a controller's observation at the start of a step.
 
         Parameters
         ----------
@@ -91,7 +91,7 @@ class Trip:
         return self.observation(0, self.plant.initial_state())
 
     def preview(self, horizon: HorizonSettings) -> StageBuilder:
-        """Return what cuts the road ahead into stages, at any second."""
+        """Return the builder that cuts the trip ahead into stages, at any second."""
         return StageBuilder(self.vehicle, self.truth, self.forecast, horizon)
 
     def with_forecast(self, forecast: Trace | Cycle | None) -> "Trip":
@@ -123,7 +123,7 @@ def as_trip(
     vehicle: str | os.PathLike[str] | Vehicle | None,
     forecast: Trace | Cycle | None,
 ) -> Trip:
-    """Return the trip of what a user gave; a trip itself stays as it is.
+    """Return a trip made from a user's arguments; a trip itself is returned unchanged.
 
     Raises
     ------

@@ -164,7 +164,7 @@ def test_auto_falls_back_to_python_and_says_so(trip, caplog, chosen, named):
         assert [record.getMessage() for record in caplog.records] == [remark]
         assert caplog.records[0].name == "qpmpc"
         simulate(trip, "mh-qp", settings=chosen)
-    assert len(caplog.records) == 1  # once a process
+    assert len(caplog.records) == 1  # once per process
     summary = run.summary()
     assert summary["solver"]["implementation"] == "python"
     assert summary["remarks"] == [remark]

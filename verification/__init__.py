@@ -1,1 +1,1 @@
-"""Checks of the controller against independent truths."""
+"""Checks of the controller against independent references."""

@@ -1,4 +1,4 @@
-/* What the firmware needs of the board: QEMU's mps2-an500, a Cortex-M7 at 25 MHz. */
+/* The firmware's interface to the board: QEMU's mps2-an500, a Cortex-M7 at 25 MHz. */
 #ifndef BOARD_H
 #define BOARD_H
 
@@ -13,7 +13,7 @@ int32_t board_read(int32_t handle, void *data, uint32_t size);
 int32_t board_write(int32_t handle, const void *data, uint32_t size);
 __attribute__((noreturn)) void board_exit(int32_t code);
 
-/* Timer of 40 ns a tick, counting up. QEMU with -icount shift=6 lets 64 ns pass an instruction. */
+/* Timer of 40 ns per tick, counting up. QEMU with -icount shift=6 takes 64 ns per instruction. */
 void board_start_timer(void);
 uint32_t board_ticks(void);
 

@@ -9,10 +9,10 @@
 enum { COMMAND_INIT = 0, COMMAND_DEPART = 1, COMMAND_STEP = 2, COMMAND_STOP = 3 };
 
 typedef struct {
-    int32_t result;       /* what the function called returned */
-    uint32_t ticks;       /* that it took */
-    uint32_t idle_ticks;  /* that measuring nothing takes */
-    uint32_t stack_bytes; /* most that was ever used */
+    int32_t result;       /* return value of the function called */
+    uint32_t ticks;       /* taken by it */
+    uint32_t idle_ticks;  /* of an empty measurement */
+    uint32_t stack_bytes; /* most ever used */
     uint32_t state_bytes; /* sizeof(mpc_state) */
     uint32_t in_bytes;
     uint32_t out_bytes;

@@ -19,8 +19,8 @@ void fault_handler(void);
 #define FPU_ACCESS (*(volatile uint32_t *)0xE000ED88u)
 #define FPU_FULL_ACCESS 0x00F00000u
 
-/* Memory protection unit: flash of the emulated board is memory like any other; this makes writing
- * to it the fault that it would be elsewhere. */
+/* Memory protection unit: flash of the emulated board is writable memory; this makes writing to it
+ * a fault, as on real boards. */
 #define MPU_CONTROL (*(volatile uint32_t *)0xE000ED94u)
 #define MPU_REGION (*(volatile uint32_t *)0xE000ED98u)
 #define MPU_BASE (*(volatile uint32_t *)0xE000ED9Cu)
@@ -59,7 +59,7 @@ __attribute__((noreturn)) void reset_handler(void)
     board_exit(main());
 }
 
-/* Fill the stack below here with a pattern, to see later how much of it was ever used. */
+/* Fill the stack below here with a pattern, to find later how much of it was ever used. */
 void board_paint_stack(void)
 {
     uint32_t *const here = (uint32_t *)__builtin_frame_address(0);

@@ -1,8 +1,8 @@
-/* The controller on a board with a Cortex-M7: what to call when, cycles, stack, a log.
+/* The controller on a board with a Cortex-M7: order of calls, cycles, stack, a log.
  *
- * Registers are those of the core, the same on every Cortex-M7. What is yours to replace is marked
+ * Registers are those of the core, the same on every Cortex-M7. The parts to replace are marked
  * YOURS. It builds with the project's start-up and linker script (`make example`), and with yours.
- * QEMU runs it, but its cycle counter stands at 0 there: QEMU has none.
+ * QEMU runs it, but does not have the cycle counter, which stays at 0 there.
  */
 #include "mpc_forecast.h"
 
@@ -21,7 +21,7 @@
 #define DWT_LAR REGISTER(0xE0001FB0u) /* some parts lock the debug unit */
 #define DWT_UNLOCK 0xC5ACCE55u
 
-/* Timer of the core, looked at rather than interrupting. */
+/* Timer of the core, polled, without interrupts. */
 #define SYST_CSR REGISTER(0xE000E010u)
 #define SYST_RVR REGISTER(0xE000E014u)
 #define SYST_CVR REGISTER(0xE000E018u)
@@ -35,7 +35,7 @@
 #define STACK_PATTERN 0xA5A5A5A5u
 #define STACK_SPARED_WORDS 16
 
-/* YOURS: the ends of the stack as your linker script names them. */
+/* YOURS: the ends of the stack, by their names in your linker script. */
 extern uint32_t link_stack_low[];
 extern uint32_t link_stack_top[];
 
@@ -52,8 +52,8 @@ static mpc_out out;
 static mpc_real demand_w[TRIP_S];
 static mpc_real speed_mps[TRIP_S];
 
-/* The last seconds, for the debugger or to be sent out. With the inputs of all seconds, sent as
- * they are, the host library drives the trip again. */
+/* The last seconds, for the debugger or to be sent out. From the inputs of all seconds, sent
+ * unchanged, the host library drives the trip again. */
 #define LOG_LENGTH 64
 typedef struct {
     uint32_t forecast_cycles;
@@ -96,7 +96,7 @@ static void wait_for_second(void)
     }
 }
 
-/* Fill what is free of the stack with a pattern, to see later how much of it was ever used. */
+/* Fill the free stack with a pattern, to find later how much of it was ever used. */
 static void paint_stack(void)
 {
     uint32_t *const here = (uint32_t *)__builtin_frame_address(0);

@@ -5,9 +5,9 @@
  *     ./example TRIP.csv > commands.csv
  *
  * TRIP.csv has a heading and then one line per second of the trip:
- * demand_w,speed_mps,soc,t_cl_degc. Demand and speed are both the forecast and what comes true. SOC
- * and coolant temperature are those measured at the start of the second; there is no car in this
- * program that would make them.
+ * demand_w,speed_mps,soc,t_cl_degc. Demand and speed are both the forecast and the true trip. SOC
+ * and coolant temperature are those measured at the start of the second; this program does not
+ * simulate a car.
  */
 #include <stdio.h>
 
@@ -24,7 +24,7 @@ static mpc_real t_cl_degc[LONGEST_S];
 static mpc_state state;
 static mpc_forecast forecast;
 
-/* Launch, a hill, braking to a stop: from speeds as a navigation system has them. */
+/* Launch, a hill, braking to a stop: from speeds as in a navigation system. */
 static int32_t built_in_trip(void)
 {
     static const int32_t steps = 60;

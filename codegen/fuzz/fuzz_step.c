@@ -1,9 +1,9 @@
 /* Any bytes in -> a finite, in-range command and a declared status.
  *
- * The bytes are read as a sequence of calls: one byte chooses mpc_init, mpc_depart or mpc_step, the
- * following ones are copied over the inputs or set one number of them, which otherwise stay as they
- * are: inputs near sensible ones are met as well as nonsense. Built with libFuzzer, or with
- * -DFUZZ_MAIN as a program that feeds itself: fuzz_step SEED RUNS.
+ * The bytes are read as a sequence of calls: one byte selects mpc_init, mpc_depart or mpc_step, the
+ * following ones are copied over the inputs or set one number of them; the others are unchanged. So
+ * inputs near sensible ones occur as well as nonsense. Built with libFuzzer, or with -DFUZZ_MAIN as
+ * a program that makes its own bytes: fuzz_step SEED RUNS.
  */
 #include <stddef.h>
 #include <stdint.h>

@@ -1,10 +1,10 @@
-/* The solver: OSQP in its embedded form with updates of vectors and matrices.
+/* The algorithm: OSQP in its embedded form with updates of vectors and matrices.
  *
  * OSQP's workspace is one set of static variables that point at each other. It cannot be part of
- * mpc_state and does not serve two controllers: the one initialised last owns it, and of any other
- * every solve fails, which its caller is told. Of what OSQP keeps between calls only the iterate of
- * a departure counts; everything else is written anew by mpc_solver_start, so that nothing of a solve
- * gone wrong, a NaN for one, is left.
+ * mpc_state and serves only one controller: the one initialised last owns it, and every solve of
+ * any other fails and is flagged. Of the data that OSQP keeps between calls only the iterate of a
+ * departure is used; everything else is written anew by mpc_solver_start, so that nothing, such as
+ * a NaN, remains from a failed solve.
  *
  * The variables are in the order of `x`, stage by stage, the rows in that of `z`.
  */
@@ -33,7 +33,7 @@ enum {
     VARIABLES = MPC_STAGES * MPC_VARS,
     ROWS = MPC_STAGES * MPC_ROWS,
     ENTRIES = (MPC_STAGES * MPC_ENTRIES) - MPC_ENTRIES_BEFORE, /* none before the first stage */
-    MOST_VALUES = VARIABLES + ENTRIES /* of what is handed over in one call */
+    MOST_VALUES = VARIABLES + ENTRIES /* of the entries passed in one call */
 };
 
 static const mpc_state *owner;
@@ -47,7 +47,7 @@ void mpc_solver_claim(const mpc_state *state)
     is_loaded = 0;
 }
 
-/* Dimensions as expected; nothing that makes its work, or the problem, differ from step to step. */
+/* Dimensions as expected; no setting that varies its work, or the problem, from step to step. */
 static int32_t is_sound(void)
 {
     const OSQPSettings *const settings = mpc_osqp_solver.settings;

@@ -1,4 +1,4 @@
-"""Processor in the loop: the firmware drives a cycle on the Python plant, watched by Python."""
+"""Processor in the loop: the firmware drives a cycle on the Python plant, checked by Python."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,11 +42,11 @@ class PilResult:
     reference : the Python controller's own closed loop on the same cycle
     instructions : of each step, shape (steps,)
     departure_instructions : of each slice before the trip
-    command_w, reference_w : engine power asked by the firmware, and by the Python controller in
-        the same states, shape (steps,); 0 with the engine off
+    command_w, reference_w : engine power commanded by the firmware, and by the Python controller
+        in the same states, shape (steps,); 0 with the engine off
     command_on, reference_on : engine on or off, likewise
     flags : of each step
-    footprint, state_bytes, stack_bytes : memory; the stack is what was really used
+    footprint, state_bytes, stack_bytes : memory; of the stack the part really used
     steps_per_s : wall-clock speed of the whole loop
     """
 
@@ -80,7 +80,7 @@ class PilResult:
 
     @property
     def ram_bytes(self) -> int:
-        """Variables and the stack that was used."""
+        """Variables and the stack used."""
         return self.footprint.ram_static + self.stack_bytes
 
     def summary(self) -> dict[str, Any]:
@@ -157,7 +157,7 @@ class _OnTarget(Controller):
         self.stack_bytes = self.state_bytes = 0
 
     def depart(self, progress: Progress | None = None) -> None:
-        """Let the target solve its first plan, slice by slice."""
+        """Solve the first plan on the target, slice by slice."""
         self._target.init()
         left = int(self.settings.mh_qp.prepared)
         self._inputs.fill(self.trip.start, self._in)
@@ -167,7 +167,7 @@ class _OnTarget(Controller):
             left = answer.result
 
     def step(self, seen: Observation) -> Decision:
-        """Ask the target."""
+        """Get the command from the target."""
         self._inputs.fill(seen, self._in)
         answer = self._target.step(self._in)
         self.instructions.append(answer.instructions)
@@ -187,7 +187,7 @@ def processor_in_the_loop(
 
     Parameters
     ----------
-    trip, settings : what is driven, and settings of the controllers
+    trip, settings : the trip to drive, and settings of the controllers
     precision : of the firmware
     progress : called as progress(steps done, steps in all)
     algorithm : of the firmware

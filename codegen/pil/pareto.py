@@ -25,14 +25,14 @@ class Pareto:
     Attributes
     ----------
     dp_fuel_g : of dynamic programming, the SOC at the end as at the start
-    results : one a algorithm, precision and iteration count
+    results : one per algorithm, precision and iteration count
     """
 
     dp_fuel_g: float
     results: list[PilResult]
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return the figures of each run, fuel above dynamic programming among them."""
+        """Return the figures of each run, including fuel above dynamic programming."""
         return [
             result.summary()
             | {
@@ -70,9 +70,9 @@ def embedded_pareto(
 
     Parameters
     ----------
-    trip, settings : what is driven; the settings' iterations per step are replaced
+    trip, settings : as of `processor_in_the_loop`; iterations per step are replaced
     precisions, algorithms, iterations : of the firmware
-    next_job : announces a job and returns where it reports its progress, see `job_count`
+    next_job : announces a job and returns the function for its progress, see `job_count`
 
     Raises
     ------

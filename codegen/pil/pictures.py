@@ -20,7 +20,7 @@ LINES = {
 
 
 def draw_pil(result: PilResult) -> bytes:
-    """Draw instructions a step, engine power and command error over time.
+    """Draw instructions per step, engine power and command error over time.
 
     Returns
     -------
@@ -31,7 +31,7 @@ def draw_pil(result: PilResult) -> bytes:
     time_s = np.arange(len(result.instructions))
     counts.plot(time_s, result.instructions / 1e6, color=BLUE, linewidth=0.9)
     counts.set_ylim(0.0, result.instructions.max() * 1.2e-6)
-    counts.set_ylabel("instructions\nmillions a step")
+    counts.set_ylabel("instructions\nmillions per step")
     power.plot(time_s, result.reference_w / 1e3, color=GREY, linewidth=1.6, label="Python f64")
     power.plot(
         time_s, result.command_w / 1e3, color=VERMILION, linewidth=0.8, label=result.precision
@@ -58,7 +58,7 @@ def draw_pil(result: PilResult) -> bytes:
 
 
 def draw_pareto(rows: Sequence[dict[str, Any]]) -> bytes:
-    """Draw fuel above DP against instructions a step; the labels are iterations.
+    """Draw fuel above DP against instructions per step; the labels are iterations.
 
     Returns
     -------
@@ -97,9 +97,9 @@ def draw_pareto(rows: Sequence[dict[str, Any]]) -> bytes:
     axes.xaxis.set_major_formatter("{x:g}")
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_ylim(bottom=0.0)
-    axes.set_xlabel("instructions a step on the Cortex-M7, millions (counted)")
+    axes.set_xlabel("instructions per step on the Cortex-M7, millions (counted)")
     axes.set_ylabel("SOC-balanced fuel above DP, %")
-    axes.set_title(f"{rows[0]['cycle']}: what an instruction buys", fontsize=10)
+    axes.set_title(f"{rows[0]['cycle']}: fuel against instructions", fontsize=10)
     axes.legend(fontsize=8, frameon=False)
     tidy(axes)
     return png(figure)

@@ -31,9 +31,9 @@ def pil_lines(result: PilResult) -> list[str]:
     counts, departure = data["instructions"], data["departure"]
     lines = [
         f"{data['cycle']}: {data['steps']} steps on {data['target']}, {data['precision']}, "
-        f"algorithm {data['algorithm']}, {data['iterations']} iterations a step, "
+        f"algorithm {data['algorithm']}, {data['iterations']} iterations per step, "
         f"{data['steps_per_s']:.0f} steps/s here",
-        f"instructions a step  {counts['median']:,} median, {counts['min']:,}..{counts['max']:,} "
+        f"instructions/step    {counts['median']:,} median, {counts['min']:,}..{counts['max']:,} "
         f"(spread {counts['spread_percent']:.3f} %)",
     ]
     if departure["slices"]:
@@ -41,7 +41,7 @@ def pil_lines(result: PilResult) -> list[str]:
             f"before the trip      {departure['slices']} slices, at most "
             f"{departure['instructions_max']:,} instructions each"
         )
-    lines.append("ms a step, estimated cycles per instruction 1.0 / 1.5 / 2.5")
+    lines.append("ms per step, estimated cycles per instruction 1.0 / 1.5 / 2.5")
     rows = data["milliseconds_estimated"]
     for clock in dict.fromkeys(row["clock_mhz"] for row in rows):
         times = [f"{r['milliseconds']:.2f}" for r in rows if r["clock_mhz"] == clock]
@@ -105,11 +105,11 @@ def write_pareto(pareto: Pareto, folder: Path) -> list[str]:
 
 
 def pareto_table(rows: Sequence[dict[str, Any]]) -> Table:
-    """Return one line a run for the terminal."""
+    """Return one line per run for the terminal."""
     table = Table(title=f"{rows[0]['cycle']}: fuel against instructions on a Cortex-M7")
     for name in ("algorithm", "precision"):
         table.add_column(name)
-    for name in ("K", "instructions a step", "spread %", "flash B", "RAM B", "above DP %"):
+    for name in ("K", "instructions per step", "spread %", "flash B", "RAM B", "above DP %"):
         table.add_column(name, justify="right")
     table.add_column("remark")
     for row in rows:
@@ -138,7 +138,7 @@ def _html(
     pareto_picture: bytes = b"",
     dp_fuel_g: float = 0.0,
 ) -> str:
-    """Return the report: one page that needs no other file."""
+    """Return the report: one self-contained page."""
     times = rows[0]["milliseconds_estimated"]
     template = files("qpmpc.codegen.pil").joinpath("pil.html.j2").read_text("utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)

@@ -1,1 +1,1 @@
-"""C made from the table of rows: types, values, factorisation, the lines of the iteration."""
+"""C made from the table of rows: types, values, factorisation, code of the iteration."""

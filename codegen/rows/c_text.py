@@ -14,11 +14,11 @@ _COMPARISONS = {ast.Gt: ">", ast.Lt: "<", ast.GtE: ">=", ast.LtE: "<="}
 
 
 class Writer:
-    """Writes formulas as C, each name as the C code has it.
+    """Writes formulas as C, each name as in the C code.
 
     Parameters
     ----------
-    names, functions : how variables and functions are written in C
+    names, functions : variables and functions in C
     """
 
     def __init__(self, names: dict[str, str], functions: dict[str, str]) -> None:
@@ -30,7 +30,7 @@ class Writer:
         Raises
         ------
         FormulaError
-            If it has a name that C does not know, or a construct that it does not have.
+            If it has a name or a construct that is not available in C.
         """
         match node:
             case ast.Constant(value=float(value)):
@@ -54,7 +54,7 @@ class Writer:
         raise FormulaError(f"C has no {ast.unparse(node)!r}")
 
     def inner(self, node: ast.expr) -> str:
-        """Write an expression that is part of another, in parentheses where it is one itself."""
+        """Write an expression that is part of another, in parentheses if it is compound."""
         text = self.expression(node)
         compound = isinstance(node, ast.BinOp | ast.Compare | ast.UnaryOp) or " ? " in text
         return f"({text})" if compound else text
@@ -81,8 +81,8 @@ class Writer:
     def function(self, function: Callable[..., Any]) -> str:
         """Write a Python function: assignments, and one value or a tuple of them returned.
 
-        Its first argument, `th`, is the set of parameters. Several values come as a structure
-        whose members are called as they are in the tuple.
+        Its first argument, `th`, is the set of parameters. Several values are returned as a
+        structure whose members have the names in the tuple.
         """
         name = function.__name__
         match ast.parse(inspect.getsource(function)).body:
@@ -91,7 +91,7 @@ class Writer:
             ]:
                 _, *arguments = [argument.arg for argument in given.args]
             case _:
-                raise FormulaError(f"{name} does not end with what it returns")
+                raise FormulaError(f"{name} does not end with a return")
         inner = Writer(self.names | {argument: argument for argument in arguments}, self._functions)
         lines, kind, before = inner.lines(body), "mpc_real", ""
         if isinstance(value, ast.Tuple):
@@ -111,7 +111,7 @@ def _body(lines: Iterable[str]) -> str:
 
 
 def wrapped(line: str, indent: int) -> str:
-    """Return a line of C, broken where it is long, the rest further in."""
+    """Return a line of C, broken if it is long, with the rest indented."""
     inner = " " * indent
     return textwrap.fill(line, WIDTH, initial_indent=inner, subsequent_indent=inner + "    ")
 

@@ -1,6 +1,6 @@
 """C code that factorises the normal matrix P + s I + A'RA stage by stage.
 
-Which entries the factor has is found here, by symbolic elimination on the pattern of the table of
+The entries of the factor are found here, by symbolic elimination on the pattern of the table of
 rows: a new variable or entry needs no edit.
 """
 
@@ -19,13 +19,13 @@ def weight(row: Row) -> str:
 class Elimination:
     """The factor L D L' of a stage, column by column.
 
-    First the states of the stage before, whose elimination that stage has prepared, then the
-    stage's own variables: next whatever leaves the fewest entries, the states last, because the
-    stage after needs them.
+    First the states of the previous stage, whose elimination that stage has prepared, then the
+    stage's own variables: next the one that leaves the fewest entries, the states last, because
+    the next stage needs them.
 
     Attributes
     ----------
-    columns : by pivot, what stands below it, in the order of elimination
+    columns : by pivot, the entries below it, in the order of elimination
     """
 
     def __init__(self) -> None:
@@ -40,8 +40,8 @@ class Elimination:
 
         for row in ROWS:
             connect(row.terms)
-        connect(before)  # by the elimination of the stage before
-        connect(ends)  # by rows of the stage after
+        connect(before)  # by the elimination of the previous stage
+        connect(ends)  # by rows of the next stage
         found: dict[Entry, list[Entry]] = {}
         while edges:
             first = [entry for entry in before if entry in edges]
@@ -58,7 +58,7 @@ class Elimination:
         }
 
     def pair(self, one: Entry, other: Entry) -> tuple[Entry, Entry]:
-        """Return a pair with the one that is eliminated later first."""
+        """Return a pair, the one eliminated later first."""
         return (one, other) if self._rank[one] >= self._rank[other] else (other, one)
 
     def normal(self, one: Entry, other: Entry) -> str:
@@ -66,7 +66,7 @@ class Elimination:
         return "m_{}_{}".format(*(entry.name for entry in self.pair(one, other)))
 
     def pairs(self) -> list[tuple[Entry, Entry]]:
-        """Entries of the normal matrix, fill-in too; those between states before are not needed."""
+        """Entries of the normal matrix with fill-in, except those between previous states."""
         return list(
             dict.fromkeys(
                 self.pair(one, other)
@@ -77,18 +77,18 @@ class Elimination:
         )
 
     def factors(self, before: bool) -> Iterator[tuple[Entry, Entry]]:
-        """Entries of L that belong to a stage as (row, column), of columns before or its own."""
+        """Entries of L of a stage as (row, column), in previous columns or its own."""
         for pivot, column in self.columns.items():
             if pivot.before is before:
                 yield from ((entry, pivot) for entry in column if not entry.before)
 
     def own(self) -> list[Entry]:
-        """Variables of the stage, as they are eliminated."""
+        """Variables of the stage, in the order of elimination."""
         return [entry for entry in self.columns if not entry.before]
 
 
 def factor_of(row: Entry, column: Entry) -> str:
-    """Return an entry of L in C; between states before it is the stage before's."""
+    """Return an entry of L in C; between previous states it is the previous stage's."""
     if row.before:
         return f"g->{Entry(row.var, False).name}_{Entry(column.var, False).name}"
     return f"f->{row.name}_{column.name}"
@@ -97,7 +97,7 @@ def factor_of(row: Entry, column: Entry) -> str:
 def factor_type(e: Elimination) -> str:
     """Return the type of a stage's factor."""
     names = [factor_of(*pair)[3:] for before in (True, False) for pair in e.factors(before)]
-    comment = "L D L' of a stage: row_column of L where it can differ from 0, states before too."
+    comment = "L D L' of a stage: row_column of L where it can differ from 0, previous states too."
     return struct(comment, "mpc_stage_factor", (*names, "inverse_d[MPC_VARS]"))
 
 
@@ -126,13 +126,13 @@ def factorise(e: Elimination) -> str:
     lines += ["}", *(line for pivot, part in pivots.items() if not pivot.before for line in part)]
     return function(
         "void rows_factorise(mpc_stage *stage, const mpc_stage *before, const mpc_stage *after)",
-        "P + s I + A'RA of a stage, factorised once the stage before is.",
+        "P + s I + A'RA of a stage, factorised after the previous stage.",
         lines,
     )
 
 
 def _assemble(e: Elimination) -> list[str]:
-    """Inequalities first, to be weighted all at once; then Hessian and equalities."""
+    """Inequalities first, weighted together; then Hessian and equalities."""
     inequalities: list[str] = []
     equalities: list[str] = []
     touched = set()
@@ -166,7 +166,7 @@ def _eliminate(e: Elimination, pivot: Entry, column: list[Entry]) -> list[str]:
         if not entry.before:
             lines.append(f"{factor_of(entry, pivot)} = {e.normal(entry, pivot)} * {inverse};")
     for low, high in combinations_with_replacement(column, 2):
-        if low.before and not high.before:  # what the pivot held of it was eliminated before
+        if low.before and not high.before:  # the pivot's share of it was eliminated before
             value = f"{factor_of(low, pivot)} * {e.normal(high, pivot)}"
             lines.append(f"{e.normal(high, low)} -= {value};")
         elif not low.before:
@@ -217,12 +217,12 @@ def substitute(e: Elimination) -> str:
         [
             function(
                 "void rows_substitute_forward(mpc_stage *stage, const mpc_stage *before)",
-                "work <- L^-1 work, once the stage before is done",
+                "work <- L^-1 work, after the previous stage",
                 forward,
             ),
             function(
                 "void rows_substitute_backward(mpc_stage *stage, const mpc_stage *after)",
-                "work <- L^-T D^-1 work, once the stage after is done",
+                "work <- L^-T D^-1 work, after the next stage",
                 backward,
             ),
         ]

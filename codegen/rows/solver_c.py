@@ -1,4 +1,4 @@
-"""C code of the solvers from the table of rows: what ADMM and OSQP do with the rows of a stage."""
+"""C code of the algorithms from the table of rows: ADMM's and OSQP's work on a stage's rows."""
 
 from collections.abc import Iterable
 
@@ -54,10 +54,10 @@ def factor_h() -> str:
 
 
 def admm_h() -> str:
-    """Return `mpc_rows_admm.h`: the lines of an iteration, row by row."""
+    """Return `mpc_rows_admm.h`: the code of an iteration, row by row."""
     return header(
         "mpc_rows_admm.h",
-        "The lines of ADMM, row by row.",
+        "An iteration of ADMM, row by row.",
         ["mpc_admm.h", "mpc_parts.h"],
         _multiply(),
         factorise(Elimination()),
@@ -68,10 +68,10 @@ def admm_h() -> str:
 
 
 def osqp_h() -> str:
-    """Return `mpc_rows_osqp.h`: entries column by column, as OSQP keeps them, and bounds."""
+    """Return `mpc_rows_osqp.h`: entries column by column, in OSQP's order, and bounds."""
     return header(
         "mpc_rows_osqp.h",
-        "The rows as OSQP has them.",
+        "The rows in OSQP's order.",
         ["mpc_parts.h", "mpc_real.h"],
         "#define UNLIMITED REAL(1.0e30)\n",
         _put_columns(),
@@ -108,7 +108,7 @@ def _right_hand_side() -> str:
     lines += [f"stage->work[{variable(var)}] = {var.name.lower()};" for var in Var]
     return function(
         "void rows_right_hand_side(mpc_stage *stage, mpc_real *work_before)",
-        "work = s x - q + A'(Rz - y); what the rows add to the stage before, too",
+        "work = s x - q + A'(Rz - y), with the rows' part for the previous stage",
         lines,
     )
 
@@ -130,7 +130,7 @@ def _update_z_y() -> str:
         lines += of_pieces(row, [call])
     return function(
         "void rows_update_z_y(mpc_stage *stage, const mpc_real *before)",
-        "z and y of all rows from t, in `work`; `before` is that of the stage before.",
+        "z and y of all rows from t, in `work`; `before` is that of the previous stage.",
         lines,
     )
 
@@ -150,7 +150,7 @@ def _put_columns() -> str:
     return function(
         "int32_t rows_put_columns(mpc_real *values, int32_t first, const mpc_stage_matrix *a,\n"
         "                                       const mpc_stage_matrix *next)",
-        "Entries of a stage's columns, each from the first row down; returns where they end.",
+        "Entries of a stage's columns, each from the first row down; returns the end.",
         [*lines, "return at;"],
     )
 

@@ -1,4 +1,4 @@
-"""C code made from the QP's table of rows: types, values, and how the rows are walked through."""
+"""C code made from the QP's table of rows: types, values, and loops over the rows."""
 
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -12,7 +12,7 @@ from qpmpc.qp.rows import ROWS, VARIABLES, Entry, Row, Var
 from qpmpc.vehicle import heat
 
 PIECES = ("fuel_slope", "fuel_intercept", "battery_slope", "battery_intercept")
-FORMULAS: tuple[Callable[..., Any], ...] = (  # Python functions made into C
+FORMULAS: tuple[Callable[..., Any], ...] = (  # Python functions translated into C
     *heat.FUNCTIONS,
     radiator_w_per_k,
     thermostat_step,
@@ -52,7 +52,7 @@ def function(signature: str, comment: str, body: Iterable[str]) -> str:
 
 
 def of_pieces(row: Row, lines: list[str]) -> list[str]:
-    """Repeat lines for each piece of a row's curve, i; once for a row without."""
+    """Repeat lines for each piece of a row's curve, i; once for a row without a curve."""
     if not row.pieces:
         return lines
     start = f"for (int32_t i = 0; i < MPC_{row.pieces.upper()}_PIECES; i++) {{"
@@ -70,7 +70,7 @@ def place(row: Row) -> str:
 
 
 def is_unit(row: Row) -> bool:
-    """Whether a row is one variable: after scaling its only entry is 1 and need not be stored."""
+    """Whether a row is one variable: scaled, its only entry is 1 and need not be stored."""
     return len(row.terms) == 1
 
 
@@ -147,16 +147,16 @@ def types_h() -> str:
         f"/* Variables of a stage. */\nenum {{\n{indented(variables)}}};\n",
         f"/* Rows of a stage. */\nenum {{\n{indented(places)}}};\n",
         struct(
-            "Rows of a stage. Of one entry they are 1 after scaling.", "mpc_stage_matrix", matrix
+            "Rows of a stage. Those of one entry are 1 after scaling.", "mpc_stage_matrix", matrix
         ),
         struct("Bounds other than 0.", "mpc_stage_bounds", limits),
         struct(
             "The road, duration 0 for a masked stage, which passes the state on at no cost; and\n"
-            " * where the coolant's heat and the thermostat are expanded.",
+            " * the point about which the coolant's heat and the thermostat are expanded.",
             "mpc_stage_road",
             (*STAGE, *(f"about_{name}" for name in ABOUT)),
         ),
-        struct("What is summed up over the stages.", "mpc_stage_sums", _running()),
+        struct("Sums over the stages.", "mpc_stage_sums", _running()),
     )
 
 
@@ -187,7 +187,7 @@ def values_h(scalars: Iterable[str]) -> str:
 
 
 def _scale() -> str:
-    """SI units of the solver's, longer stages finer; and the small quadratic cost of rates."""
+    """SI units per solver unit, longer stages finer; and the small quadratic cost of rates."""
     stretch = "MPC_STRETCH(real_max(stage->road.duration_s, SHORTEST_SCALE_S))"
     lines = [f"const mpc_real stretch = {stretch};"]
     for var, scaled in VARIABLES.items():
@@ -210,7 +210,7 @@ def _fill(writer: Writer) -> str:
         lines += known if entry.before else [f"stage->{line}"]
     return function(
         "void rows_fill(mpc_state *state, int32_t k, mpc_stage_sums *sums)",
-        "Entries and bounds of stage k, and what it adds to the cost. The first stage starts at\n"
+        "Entries and bounds of stage k, and its part of the cost. The first stage starts at\n"
         " * the origin: there is no state before it in x.",
         [
             "mpc_stage *const stage = &state->stage[k];",
@@ -231,7 +231,7 @@ def _fill_row(row: Row, writer: Writer) -> list[str]:
     else:
         lines = []
         for entry, factor in row.terms.items():
-            text = f"column[{variable(entry.var)}]"  # a state's is that of the stage before too
+            text = f"column[{variable(entry.var)}]"  # a state's is that of the previous stage too
             if not is_number(factor, 1.0):
                 text = f"{writer.inner(factor)} * {text}"
             if entry.before:
@@ -249,8 +249,8 @@ def _fill_row(row: Row, writer: Writer) -> list[str]:
 
 
 def heat_h(scalars: Iterable[str]) -> str:
-    """Return `mpc_heat.h`: heat that leaves the coolant, as the plant has it."""
+    """Return `mpc_heat.h`: heat that leaves the coolant, as in the plant."""
     writer = Writer({name: f"mpc_par.{name}" for name in scalars}, FUNCTIONS)
     functions = [writer.function(formula) for formula in FORMULAS]
-    what = "Heat that leaves the coolant, and what it makes of it: qpmpc.vehicle.heat, qp.coolant."
+    what = "Heat that leaves the coolant, and its temperature: qpmpc.vehicle.heat, qp.coolant."
     return header("mpc_heat.h", what, ["mpc_model.h", "mpc_real.h"], *functions)

@@ -5,7 +5,7 @@
  *
  *     mpc_init(&state);
  *     while (mpc_depart(&state, &in) > 0) { }      optional, before the trip: see below
- *     every second: fill in `in`; mpc_step(&state, &in, &out); obey `out`
+ *     every second: fill in `in`; mpc_step(&state, &in, &out); apply `out`
  *
  * Every call of mpc_step and of mpc_depart does at most MPC_ITERATIONS solver iterations and one
  * factorisation: a fixed amount of arithmetic.
@@ -26,7 +26,7 @@
 extern "C" {
 #endif
 
-/* What is known at the start of a second. Power in W, speed in m/s, temperature in degC. */
+/* Inputs at the start of a second. Power in W, speed in m/s, temperature in degC. */
 typedef struct {
     mpc_real soc;       /* measured state of charge, 0..1 */
     mpc_real t_cl_degc; /* measured coolant temperature */
@@ -35,7 +35,7 @@ typedef struct {
     /* accurate preview of the coming seconds; the first is the coming second itself */
     mpc_real short_demand_w[MPC_SHORT];
     mpc_real short_speed_mps[MPC_SHORT];
-    /* statistics of what lies beyond, block by block, in each block class by class (hard driving,
+    /* statistics of the trip beyond, block by block, in each block class by class (hard driving,
      * easy driving, braking): seconds, mean of the net power P0 = demand + auxiliaries (each
      * second clipped at the battery's charge limit before the mean is taken), mean speed, mean of
      * the internal battery power l(P0) with the engine off. 0 seconds where nothing is left.
@@ -44,19 +44,19 @@ typedef struct {
     mpc_real long_net_w[MPC_LONG];
     mpc_real long_speed_mps[MPC_LONG];
     mpc_real long_internal_off_w[MPC_LONG];
-    int32_t short_count; /* seconds of the short preview that lie before arrival, 1..MPC_SHORT */
+    int32_t short_count; /* seconds of the short preview before arrival, 1..MPC_SHORT */
 } mpc_in;
 
-/* Which rung of the ladder the command comes from. */
+/* Rung of the ladder that the command comes from. */
 enum {
     MPC_OPTIMISED = 0,    /* the plan of this second */
     MPC_SHIFTED_PLAN = 1, /* a plan of at most MPC_PLAN_VALID_STEPS seconds ago */
     MPC_RULES = 2         /* rules that need no plan */
 };
 
-/* Why it is not the first rung: bits of mpc_out.flags. */
+/* Reasons for a lower rung: bits of mpc_out.flags. */
 enum {
-    MPC_BAD_MEASUREMENT = 1, /* soc, t_cl_degc, demand_w or speed_mps; the last good one counts */
+    MPC_BAD_MEASUREMENT = 1, /* soc, t_cl_degc, demand_w or speed_mps; the last good one is used */
     MPC_BAD_PREVIEW = 2,     /* short or long preview; no new plan is made */
     MPC_SOLVER_FAILED = 4,   /* no usable solution */
     MPC_WARMING_UP = 8       /* the solver has not converged yet since a cold start */
@@ -72,7 +72,7 @@ typedef struct {
     int32_t iterations; /* of the solver in this call */
 } mpc_out;
 
-/* Set a defined state: no plan, cold solver, rules at rest. */
+/* Set a defined state: no plan, cold solver, rules reset. */
 void mpc_init(mpc_state *state);
 
 /* Do one slice of the departure: a cold solve, linearised MPC_DEPARTURE_LINEARISATIONS times.
@@ -90,7 +90,7 @@ int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out);
  * order of MPC_VAR_SOC and so on, and MPC_STAGES rows of MPC_ROWS duals (g of fuel per unit). */
 void mpc_plan(const mpc_state *state, mpc_real *x, mpc_real *duals);
 
-/* Layout of this build, so that a caller in another language can check its own: version of this
+/* Layout of this build, for callers in other languages to check theirs: version of this
  * interface, sizeof mpc_real, mpc_in, mpc_out, mpc_state, then MPC_SHORT, MPC_LONG, MPC_VARS,
  * MPC_ROWS, MPC_ITERATIONS, offset of mpc_in.short_count, of mpc_out.engine_on. */
 #define MPC_ABI_VERSION 2

@@ -1,4 +1,4 @@
-/* The solver: operator splitting (ADMM) with a fixed number of iterations, the algorithm of OSQP
+/* The algorithm: operator splitting (ADMM) with a fixed number of iterations, the method of OSQP
  * (Stellato, Banjac, Goulart, Bemporad, Boyd 2020) with a constant step size.
  *
  * min 1/2 x'Px + q'x  s.t.  low <= Ax <= high. Each iteration solves, with R = diag(rho) and the
@@ -10,17 +10,17 @@
  *
  * OSQP solves the same equations as a larger, indefinite system by a general sparse method. Here
  * the stages couple only through SOC and coolant temperature, so the matrix is block tridiagonal
- * and is factorised stage by stage, L D L'; which entries a stage's factor has was found when this
+ * and is factorised stage by stage, L D L'; the entries of a stage's factor were found when this
  * code was generated.
  */
 #include <stddef.h>
 
 #include "mpc_rows_admm.h"
 
-/* What stands before the first stage: 0, as all that is static. */
+/* Values before the first stage: 0, like all static variables. */
 static const mpc_real nothing[MPC_VARS];
 
-/* All memory of this solver is in the state: there is nothing to claim. */
+/* All memory of this algorithm is in the state: there is nothing to claim. */
 void mpc_solver_claim(const mpc_state *state) { (void)state; }
 
 static const mpc_stage *before(const mpc_state *state, int32_t k)

@@ -1,4 +1,4 @@
-/* Inputs that can be believed: finite and within what physics allows. */
+/* Checks of inputs: finite and physically possible. */
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
@@ -24,7 +24,7 @@ static int32_t take(mpc_real *good, mpc_real value, mpc_real low, mpc_real high)
     return fine;
 }
 
-/* Take over every measured value that is good; the others keep the last good one. */
+/* Use every good measured value; the others keep the last good one. */
 int32_t mpc_check_measured(mpc_measured *good, const mpc_in *in)
 {
     int32_t fine = take(&good->soc, in->soc, REAL(0.0), REAL(1.0));
@@ -34,7 +34,7 @@ int32_t mpc_check_measured(mpc_measured *good, const mpc_in *in)
     return fine;
 }
 
-/* What can be said of one second of a road. */
+/* Check of one second of a trip. */
 int32_t mpc_check_second(mpc_real demand_w, mpc_real speed_mps)
 {
     return within(demand_w, -LARGEST_POWER_W, LARGEST_POWER_W)

@@ -1,4 +1,4 @@
-/* Power demand of the road. */
+/* Power demand from the road load. */
 #include "mpc_constants.h"
 #include "mpc_forecast.h"
 #include "mpc_model.h"

@@ -1,8 +1,8 @@
-/* From a forecast of the trip to the statistics of its blocks: running sums, apart for each block
- * and demand class, of all that lies beyond the short horizon.
+/* From a forecast of the trip to the statistics of its blocks: running sums for each block and
+ * demand class, over the trip beyond the short horizon.
  *
- * A start adds up the whole trip; each second then takes away the one that the short horizon has
- * reached. What rounding loses is carried along (Knuth's TwoSum), so that a sum of thousands of
+ * A start adds up the whole trip; each second then subtracts the one that the short horizon has
+ * reached. Rounding errors are carried along (Knuth's TwoSum), so that a sum of thousands of
  * seconds that shrinks to a single one keeps the digits of that one. A compiler that is allowed to
  * reorder sums (-ffast-math) would undo this.
  */
@@ -25,7 +25,7 @@ static mpc_real mean_of(const mpc_sum *of, mpc_real seconds)
     return (of->sum + of->lost) / seconds;
 }
 
-/* Hard driving, easy driving, braking; all the same where there is one class. */
+/* Hard driving, easy driving, braking; always 0 with one class. */
 static int32_t class_of(mpc_real demand_w)
 {
 #if MPC_CLASSES > 1
@@ -37,7 +37,7 @@ static int32_t class_of(mpc_real demand_w)
 #endif
 }
 
-/* Add one second of the trip to its block and class, or take it away: times 1 or -1. */
+/* Add one second of the trip to its block and class, or subtract it: times 1 or -1. */
 static void count(mpc_forecast *forecast, int32_t second, int32_t times)
 {
     const mpc_real demand_w = forecast->trip.demand_w[second];
@@ -94,7 +94,7 @@ int32_t mpc_forecast_start(mpc_forecast *forecast, const mpc_road *trip)
     return (fine != 0) ? 0 : -1;
 }
 
-/* Leave in the sums what lies from the second `from` on. */
+/* Keep in the sums only the seconds from `from` on. */
 static void leave_from(mpc_forecast *forecast, int32_t from)
 {
     if (from < forecast->next) {
@@ -125,7 +125,7 @@ static void fill_long(const mpc_forecast *forecast, int32_t is_arriving, mpc_in 
         in->long_duration_s[k] = share * seconds;
         in->long_net_w[k] = share * mean_of(&of->net_w, seconds);
         in->long_speed_mps[k] = share * mean_of(&of->speed_mps, seconds);
-        /* with one class the preview is averaged: it has no more than the mean demand */
+        /* with one class the preview is averaged: it has only the mean demand */
 #if MPC_CLASSES > 1
         in->long_internal_off_w[k] = share * mean_of(&of->internal_off_w, seconds);
 #else

@@ -5,8 +5,8 @@
  *                      fill in soc, t_cl_degc, demand_w, speed_mps; mpc_step(&state, &in, &out)
  *
  * `step` counts the seconds since departure. The trip's arrays belong to the caller, may lie in
- * flash and must stay as they are until arrival. A start, and nothing else, reads the whole trip;
- * after it each second costs the same few instructions, however long the trip is.
+ * flash and must not change until arrival. Only a start reads the whole trip; after it each second
+ * costs the same few instructions for trips of any length.
  */
 #ifndef MPC_FORECAST_H
 #define MPC_FORECAST_H
@@ -21,20 +21,20 @@ extern "C" {
 
 #define MPC_LONGEST_TRIP_S 100000
 
-/* A road ahead, second by second. */
+/* The trip ahead, second by second. */
 typedef struct {
     const mpc_real *demand_w;  /* power demand of each second, negative when braking */
     const mpc_real *speed_mps; /* mean speed of each second */
     int32_t steps;             /* seconds to arrival */
 } mpc_road;
 
-/* A sum and what its rounding has lost: twice the digits of one number. */
+/* A sum and its rounding error: twice the digits of one number. */
 typedef struct {
     mpc_real sum;
     mpc_real lost;
 } mpc_sum;
 
-/* What is ahead of one demand class of one block. */
+/* The rest of one demand class of one block. */
 typedef struct {
     int32_t seconds;
     mpc_sum net_w;
@@ -42,11 +42,11 @@ typedef struct {
     mpc_sum internal_off_w;
 } mpc_class_sums;
 
-/* Memory of one forecast. Its contents are private; only its size concerns the caller. */
+/* Memory of one forecast. Its contents are private; the caller needs only its size. */
 typedef struct {
     mpc_road trip;
     int32_t block_s;
-    int32_t covered; /* seconds of the trip that the blocks hold */
+    int32_t covered; /* seconds of the trip in the blocks */
     int32_t next;    /* first second that is still in the sums */
     mpc_class_sums ahead[MPC_LONG];
 } mpc_forecast;
@@ -54,21 +54,21 @@ typedef struct {
 /* Take a forecast of the whole trip, from departure to arrival; its length sets the blocks.
  *
  * Returns 0, or -1 if the trip has no second or more than MPC_LONGEST_TRIP_S, or a value that
- * mpc_step would refuse. Then the long horizon stays empty. It may be called again on the road,
- * with another forecast of the whole trip; what it says of the past does not count.
+ * mpc_step would refuse. Then the long horizon stays empty. It may be called again under way, with
+ * another forecast of the whole trip; its values of the past are not used.
  */
 int32_t mpc_forecast_start(mpc_forecast *forecast, const mpc_road *trip);
 
 /* Fill in the preview of the second `step`, the forecast serving as the short preview too.
  *
- * Returns 0, or -1 where there is nothing ahead: short_count is then 0, and mpc_step says
+ * Returns 0, or -1 if nothing is ahead: short_count is then 0, and mpc_step flags
  * MPC_BAD_PREVIEW.
  */
 int32_t mpc_in_from_forecast(mpc_forecast *forecast, int32_t step, mpc_in *in);
 
-/* The same with a better short preview: `seen`, whose first second is the coming one. Of its arrays
- * no more than MPC_SHORT values are read. seen->steps above MPC_SHORT says that arrival is out of
- * sight; up to MPC_SHORT, that the trip ends there, whatever the forecast still holds.
+/* The same with a better short preview: `seen`, whose first second is the coming one. At most
+ * MPC_SHORT values of its arrays are read. seen->steps above MPC_SHORT means that arrival is beyond
+ * it; up to MPC_SHORT, that the trip ends there, whatever the length of the forecast.
  */
 int32_t mpc_in_from_preview(mpc_forecast *forecast, int32_t step, const mpc_road *seen, mpc_in *in);
 
@@ -77,7 +77,7 @@ int32_t mpc_in_from_preview(mpc_forecast *forecast, int32_t step, const mpc_road
  *     F = A + B v + C v^2 + m (k a + g grade / sqrt(1 + grade^2)),  A only while rolling
  *     P = F v / eta_drive when driving, F v eta_regen when braking
  *
- * Of a second the mean speed counts and the difference of the speeds at its ends. */
+ * The speed is the mean over a second, the acceleration the difference of speeds at its ends. */
 mpc_real mpc_demand_w(mpc_real speed_mps, mpc_real accel_mps2, mpc_real grade);
 
 /* sizeof(mpc_forecast), for a caller in another language. */

@@ -1,12 +1,12 @@
-/* The iterate, primal and dual: where it starts, its units, whether it may be acted on. The same for
- * every solver. */
+/* The iterate, primal and dual: its start, its units, whether it may be used. The same for every
+ * algorithm. */
 #include "mpc_constants.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
 #define LARGEST_FINITE REAL(1.0e30)
 
-/* A start at nothing: all variables 0, SOC and coolant temperature too. */
+/* A cold start: all variables 0, SOC and coolant temperature too. */
 void mpc_iterate_clear(mpc_state *state)
 {
     for (int32_t k = 0; k < MPC_STAGES; k++) {
@@ -91,7 +91,7 @@ void mpc_iterate_keep(mpc_state *state)
     }
 }
 
-/* Go back to what was kept; returns whether all of it is finite. */
+/* Restore the kept iterate; returns whether all of it is finite. */
 int32_t mpc_iterate_restore(mpc_state *state)
 {
     for (int32_t k = 0; k < MPC_STAGES; k++) {

@@ -1,4 +1,4 @@
-/* What the files of the controller offer each other. */
+/* Functions that the files of the controller share. */
 #ifndef MPC_PARTS_H
 #define MPC_PARTS_H
 
@@ -36,9 +36,9 @@ int32_t mpc_iterate_usable(const mpc_state *state);
 void mpc_iterate_keep(mpc_state *state);
 int32_t mpc_iterate_restore(mpc_state *state);
 
-/* The solver. mpc_solver_claim: this controller is the one that uses it from now on. mpc_solver_start:
- * takes values and iterate, in solver units. mpc_solver_iterate: moves the iterate on; returns 0 if the
- * solver itself says that nothing came of it. */
+/* The algorithm. mpc_solver_claim: makes this controller its user from now on. mpc_solver_start:
+ * takes values and iterate, in solver units. mpc_solver_iterate: iterates; returns 0 if the
+ * algorithm itself reports a failure. */
 void mpc_solver_claim(const mpc_state *state);
 void mpc_solver_start(mpc_state *state);
 int32_t mpc_solver_iterate(mpc_state *state, int32_t count);

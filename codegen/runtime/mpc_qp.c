@@ -12,7 +12,7 @@
 #include "mpc_real.h"
 #include "mpc_rows_values.h"
 
-/* Preview to stages: seconds first, then the classes of each block; what is past is masked. */
+/* Preview to stages: seconds first, then the classes of each block; past stages are masked. */
 void mpc_qp_road(mpc_state *state, const mpc_in *in)
 {
     for (int32_t k = 0; k < MPC_SHORT; k++) {
@@ -57,8 +57,8 @@ void mpc_qp_linearise_cold(mpc_state *state)
 }
 
 /* The last plan, in SI units. alpha is taken at the mean temperature of a stage's own ends, for
- * demand classes at that of their block's: the class that is driven first in the plan is driven all
- * over the block on the road. */
+ * demand classes at that of their block's: the class that is driven first in the plan is in reality
+ * spread over the block. */
 void mpc_qp_linearise_about_plan(mpc_state *state)
 {
     mpc_real start = real_clip(state->origin_t_cl_degc, COLDEST_DEGC, HOTTEST_DEGC);

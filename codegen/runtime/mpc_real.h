@@ -28,9 +28,9 @@
 #define REAL_FMAX(a, b) fmax((a), (b))
 #endif
 
-/* Without branches, so that time does not depend on data. Of a NaN and a number as second argument
- * the number wins. MPC_NATIVE_MINMAX, from the build, says that the processor has instructions for
- * fmin and fmax (as the Cortex-M7's FPv5 has); elsewhere they are slow library calls. */
+/* Without branches, so that time does not depend on data. With a NaN first and a number second the
+ * result is the number. MPC_NATIVE_MINMAX, from the build, means that the processor has fmin and
+ * fmax as instructions (the Cortex-M7's FPv5 does); elsewhere they are slow library calls. */
 #if defined(MPC_NATIVE_MINMAX)
 static inline mpc_real real_min(mpc_real a, mpc_real b) { return REAL_FMIN(a, b); }
 static inline mpc_real real_max(mpc_real a, mpc_real b) { return REAL_FMAX(a, b); }

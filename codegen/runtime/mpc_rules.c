@@ -38,7 +38,7 @@ mpc_command mpc_rules_decide(mpc_rule_memory *memory, const mpc_measured *seen)
     if (command.engine_on == 0) {
         memory->on_for_s = 0;
     } else if (memory->on_for_s < mpc_par.rule_min_on_s) {
-        memory->on_for_s++; /* more than the shortest run need not be counted, nor overflow */
+        memory->on_for_s++; /* stops at the shortest run, so that it cannot overflow */
     } else {
         /* long enough */
     }

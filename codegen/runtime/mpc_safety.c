@@ -1,7 +1,7 @@
 /* Safety layer: makes any one-second command admissible, in closed form.
  *
- * Whatever the optimiser returned, the result is finite and in range. In order of rank, the last
- * word first: power limits of battery and engine; SOC limits; coolant limits.
+ * Whatever the optimiser returned, the result is finite and in range. In order of priority: power
+ * limits of battery and engine; SOC limits; coolant limits.
  */
 #include "mpc_constants.h"
 #include "mpc_heat.h"

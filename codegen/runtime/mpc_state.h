@@ -1,4 +1,4 @@
-/* Memory of one controller. Its contents are private; only its size concerns the caller. */
+/* Memory of one controller. Its contents are private; the caller needs only its size. */
 #ifndef MPC_STATE_H
 #define MPC_STATE_H
 
@@ -41,7 +41,7 @@ typedef struct {
     int32_t on_for_s;
 } mpc_rule_memory;
 
-/* The measured values that count: the last good ones. */
+/* The measured values in use: the last good ones. */
 typedef struct {
     mpc_real soc;
     mpc_real t_cl_degc;
@@ -52,8 +52,8 @@ typedef struct {
 typedef struct {
     mpc_stage stage[MPC_STAGES];
     mpc_stage_iterate kept[MPC_STAGES]; /* to go back to if the solve fails */
-    /* Where SOC and coolant temperature are counted from: the state at the start of the horizon.
-     * Small numbers keep the digits of single precision for what the plan changes. */
+    /* Origin of SOC and coolant temperature: the state at the start of the horizon. Small numbers
+     * leave the digits of single precision to the changes within the plan. */
     mpc_real origin_soc;
     mpc_real origin_t_cl_degc;
     mpc_real cost;                    /* of the solver, in units per g */
@@ -65,7 +65,7 @@ typedef struct {
     int32_t solves;               /* since the last cold start, up to MPC_WARM_UP_STEPS */
     int32_t is_under_way;         /* the first step has been made */
     int32_t depart_linearisation; /* done of the departure */
-    int32_t depart_left;          /* iterations left of the linearisation at hand */
+    int32_t depart_left;          /* iterations left of the current linearisation */
     mpc_measured good;
     mpc_rule_memory rules;
 } mpc_state;

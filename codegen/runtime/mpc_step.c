@@ -19,7 +19,7 @@ void mpc_init(mpc_state *state)
     mpc_solver_claim(state);
 }
 
-/* Make the values of this second and start at the last solution, or at nothing. */
+/* Make the values of this second and start at the last solution, or from cold. */
 static void prepare(mpc_state *state, const mpc_in *in)
 {
     if (state->phase == MPC_PHASE_COLD) {
@@ -37,7 +37,7 @@ static void prepare(mpc_state *state, const mpc_in *in)
     mpc_solver_start(state);
 }
 
-/* Bring the iterate back into SI units; returns whether it is usable. If not, the solver is cold:
+/* Convert the iterate back to SI units; returns whether it is usable. If not, the solver is cold:
  * nothing of a failed solve is kept. */
 static int32_t conclude(mpc_state *state, int32_t solved)
 {
@@ -54,7 +54,7 @@ static int32_t conclude(mpc_state *state, int32_t solved)
     return usable;
 }
 
-/* One slice: the first of a linearisation takes what does not fill a whole one. */
+/* One slice: the first of a linearisation takes the remainder that does not fill a whole one. */
 static void depart_slice(mpc_state *state, const mpc_in *in)
 {
     int32_t count = MPC_ITERATIONS;
@@ -92,7 +92,7 @@ int32_t mpc_depart(mpc_state *state, const mpc_in *in)
     return result;
 }
 
-/* What is left of the last solution at the start of another second. */
+/* Prepare the last solution for the start of another second. */
 static void move_on(mpc_state *state)
 {
     if (state->phase == MPC_PHASE_DEPARTING) {
@@ -106,8 +106,8 @@ static void move_on(mpc_state *state)
     state->depart_linearisation = MPC_DEPARTURE_LINEARISATIONS;
 }
 
-/* One solve. After a failure the iterate that it started from serves again, if there was one; after
- * FAILURES_FORGIVEN more in a row it may be that iterate's fault, and the solver starts cold. */
+/* One solve. After a failure the iterate that it started from is used again, if there was one;
+ * after FAILURES_FORGIVEN more in a row it may be the cause, and the solver starts cold. */
 static int32_t solve(mpc_state *state, const mpc_in *in)
 {
     const int32_t phase = state->phase;
@@ -136,7 +136,7 @@ static void keep_plan(mpc_state *state)
     state->old_age = 0;
 }
 
-/* On from an on-share of one half up, at the power E / on_share it stands for. */
+/* On from an on-share of one half up, at the power E / on_share. */
 static mpc_command realise(const mpc_state *state)
 {
     const mpc_real on_share = state->old_on_share[state->old_age];
@@ -158,7 +158,7 @@ int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out)
     if (mpc_check_preview(in) == 0) {
         out->flags |= MPC_BAD_PREVIEW;
     }
-    /* the rules watch every second, so that their memory is right if they have to take over */
+    /* the rules are evaluated every second, so that their memory is right if they take over */
     mpc_command command = mpc_rules_decide(&state->rules, &state->good);
     move_on(state);
     if (out->flags == 0) {

@@ -1,4 +1,4 @@
-"""The command line: one command a file, heavy imports inside the commands."""
+"""The command line: one command per file, heavy imports inside the commands."""
 
 from qpmpc.cli.app import main
 

@@ -1,4 +1,4 @@
-"""The command `qpmpc`: its commands, and how errors become one line and an exit code."""
+"""The command `qpmpc`: its subcommands; errors as one line and an exit code."""
 
 import os
 import sys
@@ -73,7 +73,7 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
         )
         sys.stdout.flush()
     except BrokenPipeError:
-        # The reader, `head` for one, has left: nothing is wrong, but nothing more can be said.
+        # The reader, `head` for example, has closed the pipe: no error, but no more output.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(DONE)
     except (KeyboardInterrupt, typer.Abort):

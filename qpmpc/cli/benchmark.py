@@ -16,7 +16,7 @@ def benchmark(
     out: OutOption = None,
     quick: Annotated[bool, typer.Option("--quick", help="NYCC only, and few candidates.")] = False,
 ) -> None:
-    """Let solvers and settings drive whole cycles: fuel above DP against time a step.
+    """Drive whole cycles with several solvers and settings: fuel above DP against time per step.
 
     With --out: pictures, figures and an HTML report; the recorded QPs (npz), and
     qpmpc_recorded.py, which makes them a test set for qpbenchmark.

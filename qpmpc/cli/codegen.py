@@ -18,26 +18,26 @@ def codegen(
         str,
         typer.Option(metavar="TARGET", help="host (shared library) or cortex-m7 (firmware)."),
     ] = "host",
-    precision: Annotated[str, typer.Option(metavar="f32|f64", help="Of all arithmetic.")] = "f32",
+    precision: Annotated[str, typer.Option(metavar="f32|f64", help="For all arithmetic.")] = "f32",
     algorithm: Annotated[
         str,
         typer.Option(
             metavar="admm|osqp",
-            help="Written for this problem, or OSQP's own generated code: one instance, more "
+            help="Written for this problem, or OSQP's own generated code: one instance only, more "
             "memory and time.",
         ),
     ] = "admm",
     iterations: Annotated[
         int | None,
         typer.Option(
-            metavar="K", help="Solver iterations per step; as the controller's.", show_default=False
+            metavar="K", help="Iterations per step; default: the controller's.", show_default=False
         ),
     ] = None,
     prefix: Annotated[
         str,
         typer.Option(
             metavar="NAME_",
-            help="Before every name in the C code, so that several controllers link into one "
+            help="Put before every name in the C code, so that several controllers link into one "
             "program.",
             show_default=False,
         ),
@@ -79,6 +79,6 @@ def codegen(
     sizes = values.sizes
     result_console().print(
         f"{folder}: {len(files)} files written, target {target}, {precision}, {algorithm}, "
-        f"{sizes.stages} stages, {values.iterations} iterations a step; start with README.md",
+        f"{sizes.stages} stages, {values.iterations} iterations per step; start with README.md",
         markup=False,
     )

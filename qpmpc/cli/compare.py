@@ -20,14 +20,14 @@ def compare(
     ],
     controllers: Annotated[
         str,
-        typer.Option(metavar="NAME,NAME,...", help="Such as mh-nlp, dp; a wrong one lists all."),
+        typer.Option(metavar="NAME,NAME,...", help="Such as mh-nlp, dp; a wrong name lists all."),
     ] = DEFAULT_CONTROLLERS,
     vehicle: VehicleOption = "prius-nimh",
     set_: SetOption = None,
     json_file: JsonOption = None,
     out: OutOption = None,
 ) -> None:
-    """Compare controllers on cycles: fuel, savings, limits, time a step.
+    """Compare controllers on cycles: fuel, savings, limits, time per step.
 
     With --out: a picture and trajectories of each cycle, the figures, and an HTML report.
 

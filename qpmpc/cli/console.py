@@ -1,4 +1,4 @@
-"""What commands show: results, notes and progress."""
+"""Output of commands: results, notes and progress."""
 
 import sys
 from collections.abc import Iterator
@@ -17,10 +17,10 @@ UNLIMITED_WIDTH = 1000
 
 
 class _Console(Console):
-    """Console that leaves it to `main` what a reader's early departure means."""
+    """Console that leaves a broken pipe to `main`."""
 
     def on_broken_pipe(self) -> None:
-        """Say so, where rich would exit with code 1."""
+        """Raise, where rich would exit with code 1."""
         raise BrokenPipeError
 
 
@@ -52,7 +52,7 @@ class ProgressBar:
         self._task = progress.add_task("", total=float(jobs))
 
     def next_job(self, title: str) -> Report:
-        """Start a job; returns what it must call with its progress."""
+        """Start a job; returns the function to call with its progress."""
         done_before = self._begun
         self._begun += 1
         label = f"{title} ({self._begun}/{self._jobs})" if self._jobs > 1 else title

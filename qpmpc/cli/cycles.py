@@ -95,7 +95,7 @@ def _measured(cycle: "Cycle") -> tuple[str, ...]:
 
 
 def _published(figure: "Figure") -> str:
-    """Figure as printed, and in the unit of the measured one where that is another."""
+    """Figure as printed, and in the unit of the measured one where that differs."""
     km, kmh = figure.si / 1e3, figure.si * 3.6
     converted = {"mi": f" = {km:.3f} km", "mph": f" = {kmh:.2f} km/h"}
     return f"{figure}{converted.get(figure.unit, '')}"

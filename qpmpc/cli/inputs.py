@@ -1,4 +1,4 @@
-"""What commands do before any time is spent: load, apply overrides, check where results go."""
+"""First steps of commands, before any long work: load, apply overrides, check output paths."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""``qpmpc pil``: the generated firmware drives a cycle, instruction by instruction."""
+"""``qpmpc pil``: the generated firmware drives a cycle, with instructions counted."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -19,13 +19,13 @@ def pil(
     precision: Annotated[
         str | None,
         typer.Option(
-            metavar="f32|f64", help="Of all arithmetic; f32 if not named.", show_default=False
+            metavar="f32|f64", help="For all arithmetic; default: f32.", show_default=False
         ),
     ] = None,
     algorithm: Annotated[
         str | None,
         typer.Option(
-            metavar="admm|osqp", help="Of the firmware; admm if not named.", show_default=False
+            metavar="admm|osqp", help="Of the firmware; default: admm.", show_default=False
         ),
     ] = None,
     pareto: Annotated[

@@ -17,7 +17,7 @@ def reproduce(
     set_: SetOption = None,
     quick: Annotated[
         bool,
-        typer.Option("--quick", help="Beginnings of the cycles, coarse grids: a trial of it all."),
+        typer.Option("--quick", help="Beginnings of the cycles, coarse grids: a trial run."),
     ] = False,
 ) -> None:
     """Reproduce the paper: every figure and table, ours beside the paper's.

@@ -11,7 +11,7 @@ def simulate(
     cycle: CycleArgument,
     controller: Annotated[
         str,
-        typer.Option(metavar="NAME", help="Such as mh-qp, mh-nlp, dp; a wrong one lists all."),
+        typer.Option(metavar="NAME", help="Such as mh-qp, mh-nlp, dp; a wrong name lists all."),
     ] = "mh-qp",
     vehicle: VehicleOption = "prius-nimh",
     set_: SetOption = None,

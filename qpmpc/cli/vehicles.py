@@ -22,14 +22,14 @@ def vehicles(
     ] = None,
     toml: Annotated[
         bool,
-        typer.Option("--toml", help="Print its TOML file, any base merged in, and nothing else."),
+        typer.Option("--toml", help="Print only its TOML file, with any base merged in."),
     ] = False,
     out: OutOption = None,
 ) -> None:
     """List the shipped vehicles, or show the parameters of one and its piecewise-affine models.
 
     With --out: a picture of the piecewise-affine fits and their errors.
-    With --toml: a file to start a vehicle of your own from.
+    With --toml: a file to start your own vehicle from.
 
     For example:
 

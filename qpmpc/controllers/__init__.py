@@ -1,1 +1,1 @@
-"""Controllers: what drives the engine, from rules to the multi-horizon QP."""
+"""Controllers of the engine, from rules to the multi-horizon QP."""

@@ -1,4 +1,4 @@
-"""Charge balance of the rules: the SOC reference at which they end a trip as they began it."""
+"""Charge balance of the rules: the SOC reference with which they end a trip at its initial SOC."""
 
 import numpy as np
 
@@ -25,9 +25,9 @@ def balanced(trip: Trip, rules: RuleBasedSettings) -> RuleBasedSettings:
     """Return the thresholds with the SOC reference that balances this trip best.
 
     The reference is sought outward from the initial SOC: the first offset at which the drift
-    changes sign, refined by bisection; where it never does, the offset of the smallest drift.
-    Rules with timers jump, so the smallest drift met on the way is what counts. This needs the
-    trip in advance, as any charge-sustaining comparison of rules does; it is no causal tuning.
+    changes sign, refined by bisection; if it never does, the offset of the smallest drift.
+    Rules with timers jump, so the smallest drift found on the way is used. This needs the trip in
+    advance, as any charge-sustaining comparison of rules does; it is not a causal tuning.
     """
 
     def drift(offset: float) -> float:
@@ -55,7 +55,7 @@ def balanced(trip: Trip, rules: RuleBasedSettings) -> RuleBasedSettings:
 
 
 def rule_based(trip: Trip, settings: ControllerSettings | None = None) -> RuleBased:
-    """Make the rules for one trip, charge-balanced if the settings say so."""
+    """Make the rules for one trip, charge-balanced if so set."""
     settings = settings or ControllerSettings()
     rules = settings.rule_based
     return RuleBased(trip, settings, balanced(trip, rules) if rules.balance else rules)

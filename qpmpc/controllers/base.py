@@ -20,7 +20,7 @@ Progress = Callable[[int, int], None]
 
 
 class Decision(NamedTuple):
-    """A command and how it came about.
+    """A command and its origin.
 
     `fallback` names the rung of the degradation ladder that was used, empty if none.
     `relaxation_gap` and `on_share` are nan for controllers without a relaxation.
@@ -37,7 +37,7 @@ NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 
 
 class Driver:
-    """What controllers and planners have in common: name, trip and settings.
+    """Common base of controllers and planners: name, trip and settings.
 
     Parameters
     ----------
@@ -46,11 +46,11 @@ class Driver:
 
     Attributes
     ----------
-    name : under which results are reported; letters, digits, dots, dashes, underscores. A class
-        attribute will do; without one it is made of the name of the class
+    name : used in reports; letters, digits, dots, dashes, underscores. A class attribute is
+        enough; without one it is derived from the name of the class
     solver_name : of the QP or program solved each second, empty where there is none
-    Settings : pydantic model of settings of its own, if any. With the name ``my-own`` its fields
-        are reached as ``my_own.FIELD``, and their values by ``self.own_settings()``.
+    Settings : pydantic model of its own settings, if any. With the name ``my-own`` its fields are
+        set as ``my_own.FIELD``, and ``self.own_settings()`` returns their values.
 
     Raises
     ------
@@ -94,7 +94,7 @@ class Driver:
 class Controller(Driver, ABC):
     """A causal controller; one instance belongs to one trip and drives it once.
 
-    A subclass writes `step` and, where it has a memory or something to prepare, `depart`. Whatever
+    A subclass implements `step` and, if it has a memory or needs preparation, `depart`. Whatever
     `step` returns, the safety layer makes the command admissible.
 
     Parameters
@@ -104,13 +104,13 @@ class Controller(Driver, ABC):
     Attributes
     ----------
     implementation : language that the decisions are computed in
-    remarks : what a user should know of the choices made for this run, a line each
+    remarks : what a user should know about the choices made for this run, one line each
     """
 
     implementation: str = "python"
-    # a controller whose commands are admissible already, or are to be obeyed as they are
+    # true if the commands are already admissible, or must be applied unchanged
     has_safety_layer: ClassVar[bool] = False
-    # whether it decides from second to second, so that the time of a step means something
+    # whether it decides from second to second, so that step times are meaningful
     decides_online: ClassVar[bool] = True
     _under_way: bool | None = None  # None as long as __init__ has not run
 
@@ -121,13 +121,13 @@ class Controller(Driver, ABC):
         self._under_way = False
 
     def depart(self, progress: Progress | None = None) -> None:
-        """Get ready before the first second: set the memory, prepare what takes time.
+        """Get ready before the first second: set the memory, do slow preparations.
 
-        Called once a run.
+        Called once per run.
 
         Parameters
         ----------
-        progress : called as progress(done, in all) by whoever takes more than two seconds
+        progress : called as progress(done, in all) by controllers that take over two seconds
         """
 
     @abstractmethod
@@ -168,7 +168,7 @@ class Controller(Driver, ABC):
         self.depart(progress)
 
     def reset(self) -> None:
-        """Make ready for another run of the same trip, which `depart` will begin."""
+        """Make ready for another run of the same trip, which begins with `depart`."""
         self._under_way = False
 
 
@@ -191,5 +191,5 @@ def _decision_of(made: object, controller: Controller, second: int) -> Decision:
 
 
 def base_not_called(made: object) -> QpmpcError:
-    """Return what to raise of an object whose `__init__` has not called that of its base."""
+    """Return the error for an object whose `__init__` has not called that of its base."""
     return QpmpcError(f"{type(made).__name__}.__init__ must call super().__init__(trip, settings)")

@@ -1,4 +1,4 @@
-"""`mh-qp` written in cvxpy as a planner: to change its problem and drive with the result."""
+"""`mh-qp` written in cvxpy as a planner, for driving with a modified problem."""
 
 from typing import Any
 
@@ -17,18 +17,18 @@ cp: Any = cvxpy  # its type hints leave out half of its functions
 
 
 class CvxpyPlanner(Planner):
-    """Plans with the QP of `mh-qp` as a cvxpy program, solved to the end each second.
+    """Plans with the QP of `mh-qp` as a cvxpy program, solved to convergence each second.
 
     A subclass adds to the program in `terms`. The program must keep to cvxpy's rules for
     parametrised programs (DPP), or it is compiled anew each second.
 
     Parameters
     ----------
-    trip, settings : as of `Planner`; the settings of `mh_qp` count, its solver's left out
+    trip, settings : as of `Planner`; the settings of `mh_qp` apply, except its solver's
 
     Attributes
     ----------
-    solver : that cvxpy calls; a class attribute will do
+    solver : called by cvxpy; a class attribute is enough
     program : the program, with its expressions, objective and constraints
     preview : cuts the road ahead into stages; the first `preview.settings.short_stages` of them are
         the seconds ahead, the others are demand classes of blocks, not in the order of time
@@ -58,7 +58,7 @@ class CvxpyPlanner(Planner):
         self._about: Linearisation | None = None
 
     def terms(self, program: CvxpyTwin) -> tuple[Any, list[Any]]:
-        """Return what to add to the program: a cost in grams, and constraints.
+        """Return additions to the program: a cost in grams, and constraints.
 
         Parameters
         ----------
@@ -67,11 +67,11 @@ class CvxpyPlanner(Planner):
         return 0.0, []
 
     def depart(self, seen: Observation) -> None:
-        """Forget any trip before."""
+        """Forget any earlier trip."""
         self.forget()
 
     def forget(self) -> None:
-        """Expand the coolant about nothing known, as after a restart of the ECU on the road."""
+        """Expand the coolant without a last plan, as after a restart of the ECU under way."""
         self._about = None
 
     def plan(self, seen: Observation) -> Plan:

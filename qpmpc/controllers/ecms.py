@@ -1,4 +1,4 @@
-"""Adaptive ECMS: Pontryagin's minimum principle with costates adapted to what is measured."""
+"""Adaptive ECMS: Pontryagin's minimum principle with costates adapted to measurements."""
 
 import numpy as np
 
@@ -12,11 +12,11 @@ from qpmpc.vehicle.plant import Command
 class Ecms(Controller):
     """Adaptive equivalent consumption minimisation; no preview.
 
-    Each second the engine is off, or at that power, at which
+    Each second the engine is off, or runs at the power, whichever minimises
 
         H = alpha(T) F(P_eng) + (s G(P_d + P_aux - P_eng) - mu Q(P_eng)) / LHV      [g/s]
 
-    is least: F fuel of the hot engine, G internal battery power, Q heat into the coolant. The
+    with F fuel of the hot engine, G internal battery power, Q heat into the coolant. The
     equivalence factor follows the SOC, s = s0 + k_p e + k_i sum(e), e = SOC_init - SOC, and the
     coolant's costate mu rises linearly from 0 at the edge of the band above the lower coolant
     limit to `heat_factor` at the limit. The safety layer has the last word.
@@ -39,7 +39,7 @@ class Ecms(Controller):
         self._sum_soc_s = 0.0
 
     def depart(self, progress: Progress | None = None) -> None:
-        """Forget the deviations of any trip before."""
+        """Forget the deviations of any earlier trip."""
         self._sum_soc_s = 0.0
 
     def equivalence_factor(self, soc: float) -> float:

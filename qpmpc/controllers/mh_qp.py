@@ -1,4 +1,4 @@
-"""The multi-horizon QP controller in Python, with the horizons that are ours and the paper's."""
+"""The multi-horizon QP controller in Python, with our horizons and the paper's."""
 
 from collections.abc import Callable
 

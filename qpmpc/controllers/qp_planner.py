@@ -1,4 +1,4 @@
-"""Planner of `mh-qp`: one QP a second, linearised about and warm-started from the last, shifted."""
+"""Planner of `mh-qp`: one QP per second, expanded about and started from the last plan, shifted."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,8 +23,8 @@ from qpmpc.trip import Observation, Trip
 Floats = NDArray[np.float64]
 
 DEPARTURE_LINEARISATIONS = 5
-FAILURES_FORGIVEN = 2  # unusable solutions in a row that do not cost the plan before them
-WARM_UP_STEPS = 5  # of K iterations; measured: fewer gain nothing, more leave the rules driving
+FAILURES_FORGIVEN = 2  # unusable solutions in a row after which the last usable plan is kept
+WARM_UP_STEPS = 5  # of K iterations; measured: fewer gain nothing, with more the rules drive longer
 
 
 LEAST_SIZE_W = 1000.0  # power that the relaxation gap is relative to, at least
@@ -39,7 +39,7 @@ class QpPlan:
     stages : the horizon
     x : variables, shape (n, VARS), columns as in `Var`
     duals : g of fuel per SI unit of each row, shape (n, rows)
-    solution : what the solver said
+    solution : the solver's result
     """
 
     stages: Stages
@@ -50,14 +50,14 @@ class QpPlan:
 
 @dataclass(frozen=True)
 class Solve:
-    """One QP on its way through the solver, in solver units.
+    """One QP as given to the solver, and its result, in solver units.
 
     Attributes
     ----------
     data : values
     primal, dual : start, None where it is cold
-    cold : whether it was solved to the end, before departure
-    solution : what came of it
+    cold : whether it was solved to convergence, before departure
+    solution : the solver's result
     """
 
     data: QpData
@@ -71,15 +71,15 @@ class QpPlanner(Planner):
     """Solves the trip's QP step after step, each in the same fixed time.
 
     A QP this close to a linear program needs some thousand iterations from cold. `depart` spends
-    them before the trip starts, when time does not matter. Without it, or after a reset on the
-    road, every step spends the same K iterations from the last one's result, and the plan stays
-    unusable for `WARM_UP_STEPS` steps, in which something else has to drive.
+    them before the trip starts, when time does not matter. Without it, or after a reset under
+    way, every step spends the same K iterations from the last one's result, and the plan stays
+    unusable for `WARM_UP_STEPS` steps, in which the rules have to drive.
 
     Parameters
     ----------
     trip, settings : as of `Planner`
     of_qp : horizon, PWA curves, weights, scaling, solver; those of `mh_qp` if None
-    name : under which results are reported
+    name : used in reports
     solver : backend; that of the settings if None
     on_solve : called with every QP solved
 
@@ -91,7 +91,7 @@ class QpPlanner(Planner):
     Raises
     ------
     InputError
-        If the settings ask for a solver that there is not, or for one that they do not fit.
+        If the settings name an unknown solver, or one that they do not fit.
     """
 
     def __init__(
@@ -129,7 +129,7 @@ class QpPlanner(Planner):
         return self._solves >= WARM_UP_STEPS
 
     def depart(self, seen: Observation) -> None:
-        """Solve the QP of departure from cold, with several linearisations, to the end."""
+        """Solve the QP of departure from cold, with several linearisations, to convergence."""
         self.forget()
         if not self.of_qp.prepared:
             return
@@ -157,8 +157,8 @@ class QpPlanner(Planner):
         """Solve the QP of this second, from the last usable solution, shifted along.
 
         It is shifted by as many steps as have passed; after a reset there is none. An unusable
-        result leaves that solution in place, until so many came in a row that it may be the reason:
-        then the next step starts from nothing.
+        result leaves that solution in place; after several in a row it may be the cause, and the
+        next step starts from cold.
         """
         stages, t_cl_degc = self.preview.at(seen.step), seen.t_cl_degc
         if self.last is None:
@@ -180,7 +180,7 @@ class QpPlanner(Planner):
         return plan
 
     def forget(self) -> None:
-        """Forget the last solution, as after a restart of the controller on the road."""
+        """Forget the last solution, as after a restart of the controller under way."""
         self.last, self._solves, self._failures = None, 0, 0
 
     def _about(self, x: Floats, t_cl_degc: float) -> Linearisation:
@@ -233,7 +233,7 @@ class QpPlanner(Planner):
 
 
 def _backend(of_qp: MhQpSettings, name: str) -> QpSolver:
-    """Make the backend that the settings name; settings of another one are refused."""
+    """Make the backend named in the settings; settings of another one are refused."""
     chosen = of_qp.solver or "osqp"
     if chosen == "osqp":
         return Osqp(of_qp.admm)

@@ -13,21 +13,21 @@ from qpmpc.errors import QpmpcError
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.plant import Command
 
-ON_THRESHOLD = 0.5  # share of a 1 s stage from which the engine runs
+ON_THRESHOLD = 0.5  # share of a 1 s stage from which on the engine runs
 PLAN_VALID_STEPS = 3  # how many steps an old plan may drive before the rules take over
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a planner intends for the seconds ahead.
+    """The plan for the seconds ahead.
 
     Attributes
     ----------
     on_share : sigma, share of each second with the engine on, shape (n,), n >= 1
     power_on_w : engine power while it is on, shape (n,)
-    usable : whether it may be acted on
+    usable : whether it may be applied
     reason : why not, in a few words
-    iterations : that the solver took
+    iterations : taken by the solver
     relaxation_gap : slack of the relaxation at the first second, relative; nan if there is none
     """
 
@@ -46,7 +46,7 @@ class Plan:
 
     @classmethod
     def none(cls, reason: str = "", iterations: int = 0) -> "Plan":
-        """Return what a planner gives that has found no plan, and why."""
+        """Return the result of a planner that has found no plan, and why."""
         nothing = np.empty(0)
         return cls(nothing, nothing, usable=False, iterations=iterations, reason=reason)
 
@@ -54,7 +54,7 @@ class Plan:
 def power_while_on_w(
     on_share: NDArray[np.float64], p_eng_w: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Power E / sigma that a mean power stands for; 0 where the engine will not run."""
+    """Power E / sigma while on, of a mean power E; 0 where the engine will not run."""
     runs = on_share >= ON_THRESHOLD
     power = np.zeros_like(p_eng_w)
     np.divide(p_eng_w, np.minimum(on_share, 1.0), out=power, where=runs)
@@ -64,39 +64,39 @@ def power_while_on_w(
 class Planner(Driver, ABC):
     """Plans the engine over the seconds ahead, once a second; `RecedingHorizon` does the rest.
 
-    A subclass writes `plan`. Where it returns an unusable plan, `Plan.none()` for one, the ladder
+    A subclass implements `plan`. If it returns an unusable plan, such as `Plan.none()`, the ladder
     of `RecedingHorizon` takes over.
 
     Parameters
     ----------
-    trip : what the planner may look at: `trip.vehicle`, and the road ahead through
+    trip : data that the planner may use: `trip.vehicle`, and the trip ahead through
         `qpmpc.preview.StageBuilder`
     settings : as of `Driver`
     """
 
     def depart(self, seen: Observation) -> None:
-        """Prepare the first plan before the trip starts, and forget any trip before."""
+        """Prepare the first plan before the trip starts, and forget any earlier trip."""
 
     @abstractmethod
     def plan(self, seen: Observation) -> Plan:
         """Plan from the measured state on."""
 
     def forget(self) -> None:
-        """Forget plan and warm start, as after a restart of the ECU on the road."""
+        """Forget plan and warm start, as after a restart of the ECU under way."""
 
 
 class RecedingHorizon(Controller):
     """Drives by a planner: its plan, else its last plan shifted, else the rules.
 
-    The rules watch every second, so that their timers are right if they have to take over. The
+    The rules are evaluated every second, so that their timers are right if they take over. The
     safety layer has the last word in any case.
 
     Parameters
     ----------
     trip : to be driven
     planner : made for the same trip; its forecast may be another one
-    settings : of all controllers; `rule_based` has the thresholds of the last rung. Those of the
-        planner if None
+    settings : of all controllers; `rule_based` has the thresholds of the last rung; the planner's
+        if None
 
     Raises
     ------
@@ -123,7 +123,7 @@ class RecedingHorizon(Controller):
         self._has_reason = False
 
     def depart(self, progress: Progress | None = None) -> None:
-        """Let the planner prepare its first plan."""
+        """Prepare the planner's first plan."""
         self._rules.reset()
         self._old = None
         self.planner.depart(self.trip.start)
@@ -163,7 +163,7 @@ class RecedingHorizon(Controller):
         return plan
 
     def forget(self) -> None:
-        """Forget plan and warm start, as after a restart of the ECU on the road."""
+        """Forget plan and warm start, as after a restart of the ECU under way."""
         self.planner.forget()
         self._old = None
 

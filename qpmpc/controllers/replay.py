@@ -9,9 +9,9 @@ from qpmpc.vehicle.plant import Command
 
 
 class Replay(Controller):
-    """Plans all commands of a trip at departure and gives them whatever the plant does."""
+    """Plans all commands of a trip at departure and replays them whatever the plant does."""
 
-    has_safety_layer = True  # a plan that knows the plant is to be obeyed as it is
+    has_safety_layer = True  # a plan made with the plant itself is applied unchanged
     decides_online = False
     _commands: Sequence[Command] = ()
 

@@ -16,7 +16,7 @@ class RuleBased(Controller):
     """
 
     name = "rule-based"
-    has_safety_layer = True  # its timers count what the engine really does
+    has_safety_layer = True  # its timers count the applied command
 
     def __init__(
         self,
@@ -31,7 +31,7 @@ class RuleBased(Controller):
         self._on_for_s = 0
 
     def depart(self, progress: Progress | None = None) -> None:
-        """Put the rules at rest."""
+        """Reset the rules."""
         self._power_request = self._heat_request = False
         self._on_for_s = 0
 

@@ -5,9 +5,9 @@ from qpmpc.vehicle.engine import alpha_at
 from qpmpc.vehicle.heat import cooling_w
 from qpmpc.vehicle.plant import Command, Plant
 
-SOC_MARGIN = 1e-5  # kept from the lower limit; what a step leads to is known exactly there
-T_CL_MARGIN_K = 0.02  # kept from the upper limit; what a step leads to is known exactly there
-T_CL_COOLING_K = 0.15  # a step of engine off cools the coolant by less than this
+SOC_MARGIN = 1e-5  # kept from the lower limit; the result of a step is known exactly there
+T_CL_MARGIN_K = 0.02  # kept from the upper limit; the result of a step is known exactly there
+T_CL_COOLING_K = 0.15  # a step with the engine off cools the coolant by less than this
 T_CL_NEAR_K = 2.0  # no step warms the coolant by more than this
 BISECTIONS = 20  # of the engine power range: to some 0.05 W
 
@@ -15,8 +15,8 @@ BISECTIONS = 20  # of the engine power range: to some 0.05 W
 class SafetyLayer:
     """Corrects a command so that the next second keeps power, SOC and coolant limits.
 
-    Whatever the optimiser returned, the result is finite and in range. In order of rank, the
-    last word first: battery and engine power limits; SOC limits; coolant limits.
+    Whatever the optimiser returned, the result is finite and in range. In order of priority:
+    battery and engine power limits; SOC limits; coolant limits.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class SafetyLayer:
         return Command(True, min(max(p_eng, low, engine.power_min_w), high))
 
     def _battery_range_w(self, soc: float) -> tuple[float, float]:
-        """Terminal power the battery may take and give in the next second."""
+        """Terminal power that the battery may take and give in the next second."""
         battery, step_s = self._plant.battery, self._plant.step_s
         most = battery.discharge_limit_w(soc - SOC_MARGIN, step_s)
         return -battery.charge_limit_w(soc, step_s), most

@@ -1,4 +1,4 @@
-"""Settings of the shipped controllers, and how dotted names reach them."""
+"""Settings of the shipped controllers, and their dotted names."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeVar
@@ -27,7 +27,7 @@ class RuleBasedSettings(BaseModel):
     ----------
     k_soc_w : P_r = P_d + P_aux + k_soc (SOC_ref - SOC)
     balance : choose SOC_ref for the trip at hand so that it ends at its initial SOC
-    soc_ref_offset : SOC_ref - SOC_init, used as it is without `balance`
+    soc_ref_offset : SOC_ref - SOC_init, used unchanged without `balance`
     on_w, off_w : the engine starts above the first and stops below the second
     min_on_s : shortest run
     power_min_w : least power when it runs for power
@@ -52,15 +52,15 @@ class RuleBasedSettings(BaseModel):
 
 
 class MhQpSettings(BaseModel):
-    """Everything that shapes the controller; dotted names such as `mh_qp.admm.iterations`.
+    """All settings of the controller; dotted names such as `mh_qp.admm.iterations`.
 
     Attributes
     ----------
     implementation : `c` (the whole controller in C, compiled for this machine), `python`, or
-        `auto`: C where there is a compiler and the settings allow, which is said where they do not
+        `auto`: C where there is a compiler and the settings allow it, else Python with a remark
     solver : QP backend of the Python implementation, see `qpmpc.solvers`. Not set: ADMM with the
-        iterations of `admm`, which is OSQP in Python and our own writing of it in C
-    admm : of the solver that is not set, and of `osqp`
+        iterations of `admm`, which is OSQP in Python and our own code in C
+    admm : settings if `solver` is not set, and of `osqp`
     prepared : solve the first QP before the trip starts; if not, the rules drive the first steps
         while the solver warms up
     """
@@ -84,11 +84,11 @@ PAPER = MhQpSettings(
 
 
 class BaselineMpcSettings(BaseModel):
-    """Horizon, terminal penalty and what the baseline shares with `mh-qp`.
+    """Horizon, terminal penalty and the settings that the baseline shares with `mh-qp`.
 
     The default penalty lambda is the least, in a scan from 1e3 to 1e5 g on NYCC and the truncated
-    NEDC, that ends each trip within 0.01 of its initial SOC; a larger one moves SOC-balanced fuel
-    by no more than 0.2 % (docs/reproduction.md has the table).
+    NEDC, that ends each trip within 0.01 of its initial SOC; a larger one changes SOC-balanced
+    fuel by no more than 0.2 % (docs/reproduction.md has the table).
 
     Attributes
     ----------
@@ -121,15 +121,15 @@ class EcmsSettings(BaseModel):
     """Costates of the adaptive ECMS and how they follow the state.
 
     The defaults come from a scan on NYCC and the truncated NEDC: a tuning to the trips at hand,
-    which `mh-qp` does without.
+    which `mh-qp` does not need.
 
     Attributes
     ----------
     factor : s at the reference SOC, fuel energy that a unit of stored battery energy is worth
-    factor_per_soc : how much s rises for a unit of SOC below the reference
-    factor_per_soc_s : how much s rises each second for a unit of SOC below the reference
+    factor_per_soc : rise of s for a unit of SOC below the reference
+    factor_per_soc_s : rise of s each second for a unit of SOC below the reference
     factor_min, factor_max : range of s
-    t_cl_band_k : coolant heat is worth something within this distance of its lower limit
+    t_cl_band_k : coolant heat has a value within this distance of its lower limit
     heat_factor : fuel energy that coolant heat is worth at the limit itself, per unit
     power_step_w : spacing of the engine powers compared
     """
@@ -147,11 +147,11 @@ class EcmsSettings(BaseModel):
 
 
 class ControllerSettings(BaseModel):
-    """Settings of every controller; the first part of a dotted name picks the controller.
+    """Settings of every controller; the first part of a dotted name selects the controller.
 
     Attributes
     ----------
-    others : what was set of sections that other packages own, by section and dotted name
+    others : values set in sections of other packages, by section and dotted name
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -174,7 +174,7 @@ class ControllerSettings(BaseModel):
         Raises
         ------
         InputError
-            If what was set does not exist or is not allowed.
+            If a setting does not exist or its value is not allowed.
         """
         changed = self.others.get(section, {})
         if not changed:
@@ -190,7 +190,7 @@ class ControllerSettings(BaseModel):
     def with_settings(self, settings: Mapping[str, object]) -> "ControllerSettings":
         """Return a copy with dotted keys replaced, e.g. ``{"mh_qp.admm.iterations": 25}``.
 
-        Sections that no shipped controller has are kept as they are; who owns them checks them.
+        Sections of other packages are kept unchanged; their owners check them.
 
         Raises
         ------
@@ -216,7 +216,7 @@ class ControllerSettings(BaseModel):
         return validated(ControllerSettings, data, "controller settings")
 
 
-# What settings were called, below the section of the controller, and are called now.
+# Old and new names of settings, below the section of the controller.
 RENAMED = {"osqp.sigma": "admm.proximal_weight", "osqp": "admm"}
 OLD_SOLVERS = {"auto": "auto", "generated": "c"}
 

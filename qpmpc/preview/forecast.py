@@ -1,4 +1,4 @@
-"""What is known of the road ahead: a forecast of the trip, apart from the true cycle."""
+"""Knowledge of the trip ahead: a forecast, separate from the true cycle."""
 
 from dataclasses import dataclass
 
@@ -37,8 +37,8 @@ class Trace:
     def battery_side_w(self, vehicle: Vehicle) -> NDArray[np.float64]:
         """Net power asked of engine and battery, P0 = P_d + P_aux, W, shape (steps,).
 
-        Braking beyond the battery's charge limit goes to the friction brakes, and no more is
-        asked than engine and battery can give together.
+        Braking beyond the battery's charge limit goes to the friction brakes, and the demand is
+        limited to what engine and battery can give together.
         """
         battery = vehicle.battery
         most = battery.power_discharge_max_w + vehicle.engine.power_max_w

@@ -1,7 +1,7 @@
-"""Forecasts that are wrong: seeded error models of what is known of the road beyond the window.
+"""Wrong forecasts: seeded error models of the trip beyond the short horizon.
 
 Each model turns the true trip into another one, as a `Cycle`; `forecast` makes the demand and
-speed `Trace` of it that the long horizon sees. The short horizon always sees the truth.
+speed `Trace` of it for the long horizon. The short horizon always has the true trip.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ NOISE_SHARE, NOISE_CORRELATION_S = 0.15, 20.0
 STRETCH_SHARE = 0.05
 SHIFT_S = 10.0
 STOP_SPREAD = 0.5
-BURN_IN = 10  # correlation times after which the noise has forgotten how it began
+BURN_IN = 10  # correlation times after which the noise no longer depends on its start
 
 
 def speed_noise(cycle: Cycle, rng: np.random.Generator) -> Cycle:
@@ -31,8 +31,8 @@ def speed_noise(cycle: Cycle, rng: np.random.Generator) -> Cycle:
 
     n is Gaussian with standard deviation 0.15 and the autocorrelation (1 + t/c) exp(-t/c), whose
     integral, the correlation time, is 2 c = 20 s. That is AR(1) noise smoothed once more: plain
-    AR(1) noise of speed is rough, and its accelerations (1.4 m/s^2 rms at 30 m/s) would be those
-    of no driver. Stops stay stops.
+    AR(1) noise of speed is rough, and no driver accelerates like that (1.4 m/s^2 rms at 30 m/s).
+    Stops stay stops.
     """
     pole = float(np.exp(-2.0 / NOISE_CORRELATION_S))
     burn_in = int(BURN_IN * NOISE_CORRELATION_S)
@@ -68,7 +68,7 @@ def shift(cycle: Cycle, rng: np.random.Generator) -> Cycle:
 
 
 def stop_durations(cycle: Cycle, rng: np.random.Generator) -> Cycle:
-    """Each stop longer or shorter by a lognormal factor of its own, spread 0.5, at least 1 s."""
+    """Each stop longer or shorter by its own lognormal factor, spread 0.5, at least 1 s."""
     pieces = []
     for start, end, standing in _phases(cycle.speed_mps):
         if standing:
@@ -83,8 +83,8 @@ def stop_durations(cycle: Cycle, rng: np.random.Generator) -> Cycle:
 def another_day(cycle: Cycle, rng: np.random.Generator) -> Cycle:
     """The trip's micro-trips in random order: right in sum, wrong in place.
 
-    A micro-trip is a drive and the stop after it. A trip that does not stop on its way has one
-    only and stays as it is.
+    A micro-trip is a drive and the stop after it. A trip without stops is a single micro-trip and
+    stays unchanged.
     """
     driving = [start for start, _, standing in _phases(cycle.speed_mps) if not standing]
     if not driving:
@@ -118,7 +118,7 @@ def forecast(cycle: Cycle, vehicle: Vehicle, model: str, seed: int) -> Trace:
     Parameters
     ----------
     cycle : the true trip
-    vehicle : whose demand is forecast
+    vehicle : its demand is forecast
     model : one of `MODELS`
     seed : equal seeds give equal forecasts
 
@@ -134,7 +134,7 @@ def forecast(cycle: Cycle, vehicle: Vehicle, model: str, seed: int) -> Trace:
 
 
 def _phases(speed_mps: Floats) -> list[tuple[int, int, bool]]:
-    """Runs of points that stand or drive: (first, one after the last, standing)."""
+    """Sequences of points that stand or drive: (first, one after the last, standing)."""
     standing = speed_mps <= 0.0
     edges = [0, *(np.flatnonzero(np.diff(standing)) + 1).tolist(), len(standing)]
     return [(a, b, bool(standing[a])) for a, b in pairwise(edges)]

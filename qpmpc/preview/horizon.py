@@ -14,7 +14,7 @@ class HorizonSettings(BaseModel):
     blocks : number of equal blocks that the trip is cut into at departure, or
     block_s : length of a block, s; used when `blocks` is 0. With both 0 there is no long horizon:
         the short one recedes to arrival
-    classes : 3 demand classes a block (hard, easy, braking) or 1 (the mean, as in the paper)
+    classes : 3 demand classes per block (hard, easy, braking) or 1 (the mean, as in the paper)
     class_hard_w, class_braking_w : demand above the first is hard, below the second braking
     """
 
@@ -34,7 +34,7 @@ class HorizonSettings(BaseModel):
     def block_count(self, trip_steps: int) -> int:
         """Number of blocks for a trip of that many 1 s steps; the last may be empty.
 
-        Where it is set it is kept whatever the trip, as generated code has it.
+        A number that is set holds for every trip, as in generated code.
         """
         if self.blocks:
             return self.blocks

@@ -1,4 +1,4 @@
-"""From preview to stages: the data that a QP needs of the road ahead, in fixed slots."""
+"""From preview to stages: the data of the trip ahead that a QP needs, in fixed slots."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ class Stages:
     net_w : P0 = P_d + P_aux, mean over the stage
     speed_mps : mean speed
     internal_off_w : mean of the internal battery power l(P0) with the engine off; by convexity
-        more than l of the mean, which is all that an averaged preview (one class) has
+        more than l of the mean, which an averaged preview (one class) has to use
     """
 
     duration_s: NDArray[np.float64]
@@ -37,20 +37,20 @@ class StageBuilder:
     """Cuts a trip into stages at any time step.
 
     Slots are fixed from departure to arrival: the first N are the next N seconds, then each block
-    of the trip has one slot a demand class, at its own absolute place. A block that has passed,
-    or that the short horizon covers, has duration 0. So a long stage keeps its slot, which is
-    what lets primal and dual variables be carried from step to step by identity.
+    of the trip has one slot per demand class, at its own absolute place. A block that has passed,
+    or that the short horizon covers, has duration 0. So a long stage keeps its slot, and primal
+    and dual variables can be carried from step to step by identity.
 
     The forecast is read at the time since departure and may be wrong about the trip's length. A
-    trip that outlasts it goes on with the short horizon alone, to whose end the terminal band
-    then applies; a trip that ends before it is planned to its end as soon as the short horizon
-    sees the arrival, and what the forecast still holds is masked.
+    trip that outlasts it goes on with the short horizon alone, and the terminal band then applies
+    to its end; a trip that ends before it is planned to its end as soon as the short horizon
+    reaches the arrival, and the rest of the forecast is masked.
 
     Parameters
     ----------
     vehicle : parameters
-    truth : what the short horizon sees
-    forecast : what the long horizon sees; its length sets the blocks
+    truth : trace for the short horizon
+    forecast : trace for the long horizon; its length sets the blocks
     settings : layout
     """
 
@@ -84,12 +84,12 @@ class StageBuilder:
         fields[0, n_short:] = duration
         fields[1:, n_short:] = sums[:, 1:].transpose(1, 2, 0).reshape(FIELDS - 1, -1)
         fields[1:, n_short:] /= np.maximum(duration, 1.0)
-        if self.settings.classes == 1:  # an averaged preview knows no more than the mean demand
+        if self.settings.classes == 1:  # an averaged preview has only the mean demand
             fields[3, n_short:] = internal_off_w(self._vehicle, fields[1, n_short:])
         return Stages(*fields)
 
     def shift(self) -> NDArray[np.intp]:
-        """Where each slot's warm start comes from in the solution of the step before.
+        """Slot in the previous step's solution from which each slot's warm start comes.
 
         Short stages move up by one and the last keeps its own values, which measured better than
         those of the long stage it leaves; long stages stay.
@@ -122,7 +122,7 @@ def _demand_class(demand_w: NDArray[np.float64], settings: HorizonSettings) -> N
 def _cumulative(
     forecast: Trace, vehicle: Vehicle, demand_class: NDArray[np.intp], classes: int
 ) -> NDArray[np.float64]:
-    """Running sums over time of duration, P0, speed and l(P0), apart for each class.
+    """Running sums over time of duration, P0, speed and l(P0), separately for each class.
 
     Returns
     -------

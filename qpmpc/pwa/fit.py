@@ -94,7 +94,7 @@ def _tangent_pieces(
         slopes.append(slope)
         intercepts.append(value - slope * at)
         starts.append(at)
-        surplus = band - (f - (value + slope * (x - at)))  # of the line over the band's edge
+        surplus = band - (f - (value + slope * (x - at)))  # of the line above the band's edge
         touch = ahead[np.argmin(f[ahead] - slope * x[ahead])]
         outside = np.flatnonzero((surplus < 0.0) & (np.arange(len(x)) > touch))
         if len(outside) == 0:
@@ -115,8 +115,8 @@ def fit_convex(
     min_g max_x |g(x) - f_c(x)| / tolerance(x) over convex PWA g with that many pieces, where f_c
     is the lower convex envelope of the samples: first the fewest pieces for the tolerance, then,
     by bisection, the least error with that number. With a constant tolerance this is the minimax
-    fit; with a varying one each piece is raised by the error at its middle, and the bounds of the
-    result, which refer to f itself, are what counts.
+    fit; with a varying one each piece is raised by the error at its middle. The bounds of the
+    result refer to f itself.
 
     Parameters
     ----------

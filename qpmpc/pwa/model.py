@@ -41,7 +41,7 @@ class PwaTolerances(BaseModel):
 
 @dataclass(frozen=True)
 class PwaModel:
-    """PWA curves that the QP is made of.
+    """PWA curves of the QP.
 
     Attributes
     ----------

@@ -27,7 +27,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import the twin when it is asked for: cvxpy takes a second to load."""
+    """Import the twin on first use: cvxpy takes a second to load."""
     if name == "CvxpyTwin":
         from qpmpc.qp.cvxpy_twin import CvxpyTwin
 

@@ -48,12 +48,12 @@ def thermostat_step(
     capacity = th.heat_capacity_j_per_k
     slope = radiator_w_per_k(th)
     tau = capacity / slope
-    aim = heat_w / slope  # where the exponential leads
+    aim = heat_w / slope  # limit of the exponential
     # the line, for as long as the thermostat is closed; then the exponential, from u = 0
     straight = start_k + heat_w * duration_s / capacity
     opens = where(start_k < 0.0, where(straight > 0.0, 1.0, 0.0), 0.0)
     closed_s = where(opens > 0.0, -start_k * capacity / where(opens > 0.0, heat_w, 1.0), 0.0)
-    ever = where(start_k < 0.0, opens, 1.0)  # open; C calls no function where it never is
+    ever = where(start_k < 0.0, opens, 1.0)  # open; C calls no function if it never is
     open_for = -(duration_s - closed_s) / tau
     decay = where(ever > 0.0, exp(open_for), 1.0)
     settled = where(ever > 0.0, -expm1(open_for), 0.0)  # 1 - decay, exact for short stages too

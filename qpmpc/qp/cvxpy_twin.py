@@ -1,4 +1,4 @@
-"""The QP in cvxpy, from the table of rows: to change and to prototype with."""
+"""The QP in cvxpy, from the table of rows, for changes and prototypes."""
 
 import ast
 from collections.abc import Sequence
@@ -22,9 +22,9 @@ from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
 
-cp: Any = cvxpy  # its type hints leave out half of its functions
+cp: Any = cvxpy  # its type hints omit half of its functions
 
-# SI units that one unit of cvxpy's variables stands for, so that solvers see numbers of order one
+# SI units per unit of cvxpy's variables, so that solvers get numbers of order one
 UNIT = {
     Var.SOC: 0.01,
     Var.T_CL: 1.0,
@@ -43,7 +43,7 @@ class CvxpyTwin:
 
     over the variables and rows of `qpmpc.qp.rows`, in SI units. Its attributes are cvxpy
     expressions: build a changed `cvxpy.Problem` from `objective` and `constraints` to try an
-    idea out. Between two updates only parameters change.
+    idea. Between two updates only parameters change.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ class CvxpyTwin:
         return found
 
     def _cost(self) -> Any:
-        """Cost of all stages, and what small quadratic terms are asked for."""
+        """Cost of all stages, with the small quadratic terms that are set."""
         cost: Any = 0.0
         for entry, weight in cost_terms().items():
             cost += cp.sum(cp.multiply(self._value(weight), self._x[entry]))
@@ -143,11 +143,11 @@ class CvxpyTwin:
 
         Parameters
         ----------
-        stages : the road ahead, n stages
+        stages : the trip ahead, n stages
         soc, t_cl_degc : state at the start of the horizon
         about : linearisation point
         scaling : the regularisation of `StageQp` is defined in its solver units; with its scaling
-            it is the same here, without there is none
+            it is the same here, without it is zero
         """
         self._now[Var.SOC].value, self._now[Var.T_CL].value = soc, t_cl_degc
         self._quantities.update(stages, soc, about)

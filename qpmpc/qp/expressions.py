@@ -1,7 +1,7 @@
-"""Formulas that are written once as text and made into numpy and C: a subset common to both.
+"""Formulas written once as text and turned into numpy and C: a subset common to both.
 
 Names, numbers, + - * /, calls of functions, and comparisons inside `where`. Anything else is
-refused, so that what numpy computes is what C computes.
+refused, so that numpy and C compute the same.
 """
 
 import ast
@@ -39,7 +39,7 @@ def parsed(text: str) -> list[ast.stmt]:
     Raises
     ------
     FormulaError
-        If it is no Python, or more than numpy and C have in common.
+        If it is not Python, or outside the subset common to numpy and C.
     """
     try:
         tree = ast.parse(text)
@@ -56,12 +56,12 @@ def expression(text: str) -> ast.expr:
     """Parse one expression."""
     (statement,) = parsed(text)
     if not isinstance(statement, ast.Expr):
-        raise FormulaError(f"an assignment is no expression: {text!r}")
+        raise FormulaError(f"an assignment is not an expression: {text!r}")
     return statement.value
 
 
 def names_in(node: ast.AST) -> Iterator[str]:
-    """Names that a formula reads, those of functions too."""
+    """Names that a formula reads, including functions."""
     for part in ast.walk(node):
         if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Load):
             yield part.id
@@ -77,7 +77,7 @@ def targets_of(statement: ast.stmt) -> list[str]:
 
 
 def is_number(node: ast.expr, value: float) -> bool:
-    """Whether an expression is this number, as it stands."""
+    """Whether an expression is this number, literally."""
     return isinstance(node, ast.Constant) and node.value == value
 
 
@@ -94,7 +94,7 @@ def terms_of(node: ast.expr, variables: Collection[str]) -> dict[str, ast.expr]:
     Raises
     ------
     FormulaError
-        If it is no such sum.
+        If it is not such a sum.
     """
     match node:
         case ast.BinOp(left=left, op=ast.Add() | ast.Sub(), right=right):

@@ -49,7 +49,7 @@ class Linearisation:
         """Return the point that a plan gives.
 
         T^ is the mean of a stage's own ends, for demand classes that of their block's: the class
-        driven first in the plan is driven all over the block on the road, and at the block's
+        driven first in the plan is in reality spread over the block, and driven at the block's
         temperature.
 
         Parameters

@@ -20,7 +20,7 @@ from qpmpc.vehicle.parameters import Thermal
 
 Floats = NDArray[np.float64]
 
-# What changes from step to step: a stage, the point it is expanded about, the state now.
+# Changing from step to step: a stage, the point it is expanded about, the state now.
 STAGE = ("duration_s", "net_w", "speed_mps", "internal_off_w")
 ABOUT = ("t_cl_degc", "fuel_g_per_s", "p_eng_w", "t_cl_start_degc", "t_cl_end_degc")
 INPUTS = (*STAGE, *(f"about_{name}" for name in ABOUT), "start_soc")
@@ -38,9 +38,9 @@ def pieces_of(model: PwaModel) -> dict[str, Floats]:
 
 
 class Quantities:
-    """Evaluates expressions of the table; what no step changes is evaluated once.
+    """Evaluates expressions of the table; constant ones are evaluated once.
 
-    Arrays have shape (n, 1), one row a stage, or (1, pieces) and (n, pieces) in rows of a curve.
+    Arrays have shape (n, 1), one row per stage, or (1, pieces) and (n, pieces) in rows of a curve.
 
     Parameters
     ----------
@@ -97,5 +97,5 @@ class Quantities:
         return names
 
     def value(self, code: CodeType) -> Any:
-        """Evaluate an expression for what was last updated."""
+        """Evaluate an expression with the values of the last update."""
         return eval(code, self._names)

@@ -1,14 +1,14 @@
-"""The one table of the QP: variables, the quantities its rows are made of, rows and cost.
+"""The only table of the QP: variables, quantities, rows and cost.
 
 Everything else is made from it: the values in numpy (`StageQp`), the sparsity pattern, the C code
 and OSQP's order of columns (`qpmpc.codegen.rows.stage_c`), and the table in the docs. A row is an
 equation in the variables of a stage; `soc_before` is `soc` of the stage before, for the first
-stage the state now. What its coefficients are made of are numbers of `qp_parameters`, the stage
+stage the state now. Its coefficients are made from numbers of `qp_parameters`, the stage
 (`Stages`), the point it is expanded about (`Linearisation`), the pieces of the PWA curves, the
 constants below and QUANTITIES.
 
 States count from an origin. In numpy that is 0; in C it is the state at the start of the horizon,
-because small numbers keep the digits of single precision for what the plan changes.
+because small numbers leave the digits of single precision to the changes within the plan.
 """
 
 import ast
@@ -26,7 +26,7 @@ SIGMA_FORCED = 0.99  # "engine must be on" as a lower bound on sigma, kept apart
 
 
 class Var(IntEnum):
-    """Variables of a stage, in the order they stand in x, in Python and in C."""
+    """Variables of a stage, in their order in x, in Python and in C."""
 
     SOC = 0  # at the end of the stage
     T_CL = 1  # degC, at the end of the stage
@@ -41,7 +41,7 @@ VARS = len(Var)
 
 
 class Variable(NamedTuple):
-    """Scaling of a variable: SI units in one of the solver's; a rate's shrink with duration."""
+    """Scaling of a variable: SI units per solver unit; that of a rate shrinks with duration."""
 
     unit: str
     is_rate: bool = False
@@ -125,7 +125,7 @@ class Row:
     ----------
     name : in Python, C and the docs
     text : `terms == bound`, `terms >= bound`, `terms <= bound` or `bound <= terms <= bound`
-    pieces : the PWA curve (`fuel`, `battery`) of which each piece makes a row; empty for one row
+    pieces : the PWA curve (`fuel`, `battery`) with one row per piece; empty for a single row
     """
 
     name: str
@@ -163,12 +163,12 @@ class Row:
 
     @property
     def is_equality(self) -> bool:
-        """Whether both bounds are one."""
+        """Whether both bounds are the same."""
         return self.low is self.high
 
     @property
     def before(self) -> Entry | None:
-        """The state of the stage before that it contains."""
+        """The state of the previous stage that it contains."""
         return next((entry for entry in self.terms if entry.before), None)
 
 
@@ -207,12 +207,12 @@ def cost_terms() -> dict[Entry, ast.expr]:
 
 
 def states() -> list[Var]:
-    """Variables that a row of the stage after contains: they couple the stages."""
+    """Variables that a row of the next stage contains: they couple the stages."""
     return [var for var in Var if any(Entry(var, True) in row.terms for row in ROWS)]
 
 
 class Rows:
-    """Where the rows of a stage stand in A; counts depend on the PWA curves.
+    """Positions of a stage's rows in A; counts depend on the PWA curves.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ class ScalingSettings(BaseModel):
     Attributes
     ----------
     power_w, fuel_g_per_s, t_cl_k : one solver unit of each quantity
-    energy_j : one solver unit of SOC, as the energy it stands for
+    energy_j : one solver unit of SOC, as battery energy
     duration_exponent : a stage's rates are counted in units / h^exponent, so that a long stage's
         variables, which weigh more, are resolved finer; 1 makes them energies, 0 plain rates
     """

@@ -1,4 +1,4 @@
-"""The multi-horizon QP: values of all its entries, updated in place of being rebuilt."""
+"""The multi-horizon QP: values of all its entries, updated instead of rebuilt."""
 
 from dataclasses import dataclass
 from types import CodeType
@@ -33,9 +33,9 @@ class QpSettings(BaseModel):
     terminal_low, terminal_high : terminal SOC band as multiples of the initial SOC (paper eq. 11)
     soc_penalty_g : lambda of a quadratic terminal cost, g per (unit SOC)^2, instead of the band
     soc_reserve : share of the room between the lower SOC limit and the initial SOC that stages of
-        more than 1 s are planned to leave, for what the forecast does not foretell
+        more than 1 s are planned to leave, for errors of the forecast
     t_cl_margin_k : the coolant is planned to stay this far above its lower limit
-    slack_g_per_k : price of a coolant limit exceeded, g per K and stage
+    slack_g_per_k : price of exceeding a coolant limit, g per K and stage
     regularisation : quadratic cost on rates and slack in solver units, far below any fuel
     """
 
@@ -68,7 +68,7 @@ class QpData:
 def qp_parameters(
     vehicle: Vehicle, model: PwaModel, settings: QpSettings, units: ScalingSettings
 ) -> dict[str, float]:
-    """Collect the numbers that the QP is made of, by the names that its table gives them."""
+    """Collect the numbers of the QP, by their names in its table."""
     engine, battery, thermal, trip = vehicle.engine, vehicle.battery, vehicle.thermal, vehicle.trip
     return {
         "engine_max_w": engine.power_max_w,
@@ -144,7 +144,7 @@ class StageQp:
         self._is_rate = np.array([variable.is_rate for variable in VARIABLES.values()])
 
     def _fill_constants(self) -> list[tuple[Floats, CodeType]]:
-        """Fill in what no step changes; return the other places and what to fill them with."""
+        """Fill in the constant entries; return the places and formulas of the others."""
         structure, each_step = self.structure, []
         for row in ROWS:
             place = self.rows[row.name]
@@ -166,7 +166,7 @@ class StageQp:
 
         Parameters
         ----------
-        stages : the road ahead, n stages
+        stages : the trip ahead, n stages
         soc, t_cl_degc : state at the start of the horizon
         about : linearisation point
 
@@ -188,7 +188,7 @@ class StageQp:
         return self._scaled(stages.duration_s, cost)
 
     def _start_at(self, state: dict[Var, float]) -> None:
-        """Put the state now, which is no variable, into the bounds of the first stage."""
+        """Put the state now, which is not a variable, into the bounds of the first stage."""
         for rows, entries, var in self._before:
             known = self._values[0, entries] * state[var]
             self._lower[0, rows] -= known
@@ -199,7 +199,7 @@ class StageQp:
         structure, units = self.structure, self.units
         stretch = np.maximum(duration_s, SHORTEST_SCALE_S) ** -units.duration_exponent
         column = self._unit * np.where(self._is_rate, stretch[:, None], 1.0)
-        before = np.zeros_like(column)  # the first stage has none: its entries do not count
+        before = np.zeros_like(column)  # the first stage's own are not used
         before[1:] = column[:-1]
         entry_scale = np.where(
             structure.entry_before, before[:, structure.entry_var], column[:, structure.entry_var]

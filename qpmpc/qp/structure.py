@@ -1,4 +1,4 @@
-"""The QP's sparsity pattern, stage by stage, as the table of rows has it."""
+"""The QP's sparsity pattern, stage by stage, from the table of rows."""
 
 import numpy as np
 import scipy.sparse as sp

@@ -1,1 +1,1 @@
-"""Results for people: tables, pictures, files, the HTML report."""
+"""Results for readers: tables, pictures, files, the HTML report."""

@@ -12,7 +12,7 @@ NONE = "-"
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its title, with the unit, and how the JSON of a run becomes a cell."""
+    """A column: its title, with the unit, and the function from a run's JSON to a cell."""
 
     title: str
     text: Callable[[Row], str]
@@ -27,7 +27,7 @@ def _number(value: float | None, digits: int) -> str:
 
 
 def _marked(row: Row, key: str, digits: int) -> str:
-    """Number with the mark of runs that are not comparable, when there is a number."""
+    """Number, if there is one, with the mark of runs that are not comparable."""
     text = _number(row[key], digits)
     return text if row["comparable"] or row[key] is None else text + NOT_COMPARABLE
 

@@ -1,4 +1,4 @@
-"""The HTML report of a comparison: one file that needs nothing else."""
+"""The HTML report of a comparison: one self-contained file."""
 
 import json
 from base64 import b64encode
@@ -28,7 +28,7 @@ def compare_html(
     ----------
     runs : all with one vehicle
     rows : the same runs, as `compare_runs` returns them
-    settings : with which they were made
+    settings : that they were made with
     pictures : PNG of each cycle
     """
     vehicle = runs[0].vehicle
@@ -81,7 +81,7 @@ def _text(value: Any) -> str:
 
 
 def _remarks(rows: Sequence[Row], settings: ControllerSettings) -> list[str]:
-    """What a reader must know before believing the table."""
+    """Remarks that a reader needs to judge the table."""
     present = {row["controller"] for row in rows}
     solved_by = ", ".join(
         dict.fromkeys(
@@ -93,7 +93,7 @@ def _remarks(rows: Sequence[Row], settings: ControllerSettings) -> list[str]:
     remarks = [
         "Balanced fuel is the fuel burnt plus that which the difference between initial and final "
         "SOC is worth at the efficiency trip.eta_eq. Savings and distances compare balanced fuel.",
-        "Controllers with a preview are given the true trip, in the short and in the long horizon: "
+        "Controllers with a preview get the true trip, in the short and in the long horizon: "
         "no forecast error.",
         "Step times are wall times of one decision in this Python process, all runs one after the "
         "other. A QP controller that is prepared (its setting below) solves its first QP before "
@@ -112,8 +112,8 @@ def _remarks(rows: Sequence[Row], settings: ControllerSettings) -> list[str]:
             )
     if OPTIMUM in present:
         remarks.append(
-            "dp is dynamic programming: it knows the whole trip and the plant itself, is no "
-            "controller that could run in a car, and has no time a step."
+            "dp is dynamic programming: it knows the whole trip and the plant itself, could not "
+            "run in a car, and has no time per step."
         )
         worst = min((row["fuel_above_dp_percent"] for row in rows), default=0.0)
         if worst < 0.0:
@@ -130,5 +130,5 @@ def _remarks(rows: Sequence[Row], settings: ControllerSettings) -> list[str]:
             f"{row['controller']} on {row['cycle']} ({row['fallback_steps']} s)"
             for row in fallbacks
         )
-        remarks.append(f"A fallback drove in place of the optimiser: {names}.")
+        remarks.append(f"A fallback drove instead of the optimiser: {names}.")
     return [*remarks, *dict.fromkeys(remark for row in rows for remark in row["remarks"])]

@@ -1,4 +1,4 @@
-"""What made a result: versions, machine, time."""
+"""Provenance of a result: versions, machine, time."""
 
 import os
 import platform
@@ -12,7 +12,7 @@ PACKAGES = ("numpy", "scipy", "osqp")
 
 
 def provenance() -> dict[str, str]:
-    """Return what a reader needs in order to repeat the result or to judge its step times."""
+    """Return the data needed to repeat the result or to judge its step times."""
     packages = {name: _version(name) for name in PACKAGES}
     return {
         "qpmpc-iptm": __version__,
@@ -32,7 +32,7 @@ def _version(name: str) -> str:
 
 
 def _processor() -> str:
-    """Model of the processor; Linux tells it in a file, others through `platform`."""
+    """Model of the processor; from a file on Linux, else from `platform`."""
     try:
         lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
     except OSError:

@@ -1,4 +1,4 @@
-"""The piecewise-affine (PWA) models of a vehicle beside the curves they stand for."""
+"""The piecewise-affine (PWA) models of a vehicle beside the curves they approximate."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PwaCurve:
-    """One curve, its fit, and how to show them.
+    """One curve, its fit, and their units and labels.
 
     Attributes
     ----------
@@ -23,8 +23,8 @@ class PwaCurve:
     fit : the PWA function
     x_unit, y_unit : size of a shown unit in those of the fit
     y_unit_name : unit of the error, empty where there is none
-    baseline : slope of a line that is taken off y before it is drawn, to show the curvature
-    drawn_label : of what is then drawn
+    baseline : slope of a line that is subtracted from y before it is drawn, to show the curvature
+    drawn_label : label of the difference drawn
     """
 
     title: str

@@ -1,4 +1,4 @@
-"""How pictures look: colours that colour-blind readers can tell apart, one set-up for all."""
+"""Style of all pictures: colours that colour-blind readers can tell apart."""
 
 from io import BytesIO
 from typing import Any
@@ -35,7 +35,7 @@ def line_style(controller: str, index: int = 0) -> dict[str, Any]:
 
 
 def tidy(axes: Axes) -> None:
-    """Take off what carries no information."""
+    """Remove parts that carry no information."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(color="#dddddd", linewidth=0.6)
     axes.set_axisbelow(True)

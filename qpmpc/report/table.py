@@ -1,4 +1,4 @@
-"""Tables in the terminal that never lose a number to a narrow window."""
+"""Tables in the terminal that show every number even in a narrow window."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Trajectories as CSV: a row a second, the unit in the name of each column."""
+"""Trajectories as CSV: one row per second, the unit in the name of each column."""
 
 import csv
 from io import StringIO

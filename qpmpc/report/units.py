@@ -1,4 +1,4 @@
-"""Units of parameters, as the ends of their names say."""
+"""Units of parameters, from the ends of their names."""
 
 _UNITS = {
     "n_per_mps2": "N/(m/s)²",
@@ -25,7 +25,7 @@ _UNITS = {
 
 
 def unit_of(name: str) -> str:
-    """Return the unit at the end of a parameter's name; empty if it has none."""
+    """Return the unit at the end of a parameter's name; empty if there is none."""
     for suffix, unit in _UNITS.items():
         if name.endswith(f"_{suffix}"):
             return unit

@@ -38,13 +38,13 @@ def write_comparison(
     settings: ControllerSettings,
     folder: Path,
 ) -> list[str]:
-    """Write trajectories, figures, a picture a cycle and the report; returns remarks.
+    """Write trajectories, figures, one picture per cycle and the report; returns remarks.
 
     Parameters
     ----------
     runs : all with one vehicle
     rows : the same runs, as `compare_runs` returns them
-    settings : with which they were made
+    settings : that they were made with
     """
     for run in runs:
         write_text(folder / f"{run.cycle}_{run.controller}.csv", trajectory_csv(run))
@@ -68,7 +68,7 @@ def comparison_html(
     settings: ControllerSettings,
     pictures: Mapping[str, bytes] | None = None,
 ) -> str:
-    """Return the report; its pictures are drawn if they are not given.
+    """Return the report; its pictures are drawn if not given.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What every QP backend offers: set up once, then solve with new values, warm-started."""
+"""The interface of QP backends: set up once, then solve with new values, warm-started."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -32,7 +32,7 @@ class QpSolution:
     primal, dual : of the QP; a dual is above 0 at an active upper bound
     status : see `Status`
     iterations : of the solver's own kind
-    solve_s, update_s : wall time of the solve alone and of bringing in new values before it, s;
+    solve_s, update_s : wall time of the solve alone and of the update of values before it, s;
         for reports only, never for decisions
     """
 
@@ -45,7 +45,7 @@ class QpSolution:
 
     @property
     def usable(self) -> bool:
-        """Whether it may be acted on: solved or stopped at the limit, finite and in range."""
+        """Whether it may be used: solved or stopped at the limit, finite and in range."""
         return (
             self.status in (Status.SOLVED, Status.ITERATION_LIMIT)
             and bool(np.abs(self.primal).max() < LARGEST_PLAUSIBLE)
@@ -59,14 +59,14 @@ class QpSolver(Protocol):
     name: str
 
     def setup(self, structure: QpStructure, data: QpData) -> None:
-        """Set up for the pattern of `structure`; called once a trip."""
+        """Set up for the pattern of `structure`; called once per trip."""
 
     def solve(
         self, data: QpData, primal: Floats | None, dual: Floats | None, cold: bool = False
     ) -> QpSolution:
         """Solve with new values, starting at the given primal and dual, or at zero where None.
 
-        `cold` says that the start is far from the solution: a solver with an iteration limit
+        `cold` means that the start is far from the solution: a solver with an iteration limit
         may then use its larger one.
         """
 
@@ -86,5 +86,5 @@ def nothing(data: QpData) -> tuple[Floats, Floats]:
 
 
 def failed(data: QpData) -> QpSolution:
-    """Return the solution of a QP that no solver was given."""
+    """Return the solution of a QP that was passed to no solver."""
     return QpSolution(*nothing(data), status=Status.FAILED, iterations=0, solve_s=0.0)

@@ -1,4 +1,4 @@
-"""Clarabel: interior point, sparse, persistent; it starts each solve from nothing."""
+"""Clarabel: interior point, sparse, persistent; it starts each solve from cold."""
 
 from typing import Any
 

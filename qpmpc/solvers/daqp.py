@@ -24,8 +24,8 @@ PROXIMAL_WEIGHT = 1e-4  # makes the Hessian definite; fewest outer iterations on
 class Daqp(TimedSolver):
     """Backend over the native DAQP interface.
 
-    The Hessian has zeros, so DAQP runs inside its own proximal-point iterations, which remove
-    the effect of the weight they add.
+    The Hessian has zeros, so DAQP runs inside its own proximal-point iterations, which cancel
+    the effect of the weight that they add.
     """
 
     name = "daqp"

@@ -1,4 +1,4 @@
-"""Whether a QP has a feasible point at all, for solvers that cannot tell."""
+"""Whether a QP has a feasible point at all, for solvers that do not report it."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 from qpmpc.qp.stage_qp import QpData
 from qpmpc.qp.structure import QpStructure
 
-FEASIBILITY_TOLERANCE = 1e-7  # in solver units, of the linear programme
+FEASIBILITY_TOLERANCE = 1e-7  # in solver units, of the linear program
 
 
 def is_infeasible(structure: QpStructure, data: QpData) -> bool:

@@ -1,8 +1,8 @@
-"""The forms of a QP that other solvers want: equalities apart, one-sided rows.
+"""The forms of a QP that other solvers need: separate equalities, one-sided rows.
 
 The rows of `lower <= A x <= upper` are sorted once, at set-up; each step only picks values out
-of the data vector of A. A step whose rows have become equalities, or lost a bound, does not fit
-any more and has to be sorted anew.
+of the data vector of A. If rows have become equalities, or lost a bound, in a step, they have to
+be sorted anew.
 """
 
 import numpy as np
@@ -29,7 +29,7 @@ class PickedRows:
     Parameters
     ----------
     structure, data : pattern of A and one set of its values
-    rows : which rows, in the order wanted
+    rows : which rows, in the required order
     sign : +1 or -1 for each of them; all +1 if None
     """
 
@@ -89,7 +89,7 @@ class TwoSided:
 
 
 class OneSided:
-    """min 1/2 x'Px + q'x  s.t.  A x = b,  G x <= h: each side of a row is a row of its own.
+    """min 1/2 x'Px + q'x  s.t.  A x = b,  G x <= h: each side of a row is a separate row.
 
     `all` holds the rows of A and, below them, those of G.
 

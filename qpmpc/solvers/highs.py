@@ -1,4 +1,4 @@
-"""HiGHS: active set for QPs, sparse; it starts each solve from nothing."""
+"""HiGHS: active set for QPs, sparse; it starts each solve from cold."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ _STATUS = {
 }
 FINEST_TOLERANCE = 1e-10  # the least that HiGHS takes
 ITERATION_LIMIT = 2000  # several times what recorded problems need: beyond it, HiGHS cycles
-REGULARISATION = 1e-8  # added to the Hessian's diagonal; with none at all HiGHS cycles more often
+REGULARISATION = 1e-8  # added to the Hessian's diagonal; without it HiGHS cycles more often
 
 
 class Highs(TimedSolver):

@@ -12,7 +12,7 @@ from qpmpc.solvers.base import Floats, QpSolution, Status, consistent, failed
 from qpmpc.solvers.forms import hessian_matrix
 from qpmpc.solvers.settings import AdmmSettings
 
-# Of OSQP's own: no scaling, which would differ from step to step, no adaptation, no early exit.
+# For OSQP: no scaling, which would differ from step to step, no adaptation, no early exit.
 SAME_WORK: dict[str, Any] = {
     "scaling": 0,
     "adaptive_rho": False,

@@ -1,4 +1,4 @@
-"""PIQP: proximal interior point, sparse, persistent; it starts each solve from nothing."""
+"""PIQP: proximal interior point, sparse, persistent; it starts each solve from cold."""
 
 from typing import Any
 

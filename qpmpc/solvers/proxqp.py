@@ -27,8 +27,8 @@ OUTER_LIMIT, INNER_LIMIT = 100, 300
 class Proxqp(TimedSolver):
     """Backend over the native dense ProxQP interface.
 
-    Its own test seldom notices that a problem is infeasible before the iteration limit; there, a
-    linear programme decides.
+    Its own test seldom detects an infeasible problem before the iteration limit; at the limit, a
+    linear program decides.
     """
 
     name = "proxqp"
@@ -67,7 +67,7 @@ class Proxqp(TimedSolver):
 
     def _run(self, data: QpData, primal: Floats | None, dual: Floats | None) -> Outcome:
         if primal is None or dual is None:
-            self._start(self._pattern, data)  # what the last solve left behind can mislead it
+            self._start(self._pattern, data)  # leftovers of the last solve can mislead it
             self._solver.settings.initial_guess = self._guess.EQUALITY_CONSTRAINED_INITIAL_GUESS
             self._solver.solve()
         else:

@@ -1,4 +1,4 @@
-"""QOCO: interior point, sparse, persistent; it starts each solve from nothing."""
+"""QOCO: interior point, sparse, persistent; it starts each solve from cold."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ class Qoco(TimedSolver):
     """Backend over the native QOCO interface.
 
     QOCO has no status for an infeasible problem: it stops with a numerical error or at its
-    iteration limit. Where it does not solve, a linear programme decides what the reason was.
+    iteration limit. If it finds no solution, a linear program decides whether there is one.
     """
 
     name = "qoco"

@@ -1,4 +1,4 @@
-"""Settings of ADMM, apart from the solver itself, which takes time to load."""
+"""Settings of ADMM, separate from the solver itself, which takes time to load."""
 
 from typing import Annotated
 
@@ -16,8 +16,8 @@ class AdmmSettings(BaseModel):
     cold_iterations : iterations of a solve without warm start, at departure
     rho, proximal_weight, relaxation : step size, weight of the proximal term (sigma in OSQP's
         paper) and over-relaxation
-    status_tolerance : on the residuals, absolute and relative, for OSQP's result to be called
-        solved; what comes of a step that is not, is used all the same
+    status_tolerance : on the residuals, absolute and relative, for OSQP's result to count as
+        solved; a result that does not is used all the same
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)

@@ -12,7 +12,7 @@ from qpmpc.solvers.timed import DEFAULT_TOLERANCE, Outcome, TimedSolver, array
 
 
 class ThroughQpsolvers(TimedSolver):
-    """Backend over `qpsolvers.solve_problem`, which knows neither persistence nor iterations.
+    """Backend over `qpsolvers.solve_problem`, which has neither persistence nor iterations.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class ThroughQpsolvers(TimedSolver):
         self._problem: Any = self.module.Problem(p, data.q, g, h, a, b)
 
     def _run(self, data: QpData, primal: Floats | None, dual: Floats | None) -> Outcome:
-        with warnings.catch_warnings(action="ignore"):  # the status says it
+        with warnings.catch_warnings(action="ignore"):  # the status reports it
             result = self.module.solve_problem(self._problem, self._solver, initvals=primal)
         if result.found:
             dual = self._form.join(array(result.y), array(result.z))

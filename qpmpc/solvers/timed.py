@@ -1,4 +1,4 @@
-"""What all tolerance-driven backends share: data update and solve, timed apart."""
+"""The base of all tolerance-driven backends: data update and solve, timed separately."""
 
 from abc import ABC, abstractmethod
 from importlib import import_module
@@ -14,11 +14,11 @@ from qpmpc.qp.structure import QpStructure
 from qpmpc.solvers.base import Floats, QpSolution, Status, consistent, failed
 
 DEFAULT_TOLERANCE = 1e-8
-EXTRA = "verification"  # the extra of qpmpc-iptm that brings these solvers
+EXTRA = "verification"  # the extra of qpmpc-iptm that installs these solvers
 
 
 class Outcome(NamedTuple):
-    """What a backend returns of one solve."""
+    """A backend's result of one solve."""
 
     primal: Floats
     dual: Floats
@@ -82,7 +82,7 @@ class TimedSolver(ABC):
 
     @abstractmethod
     def _start(self, structure: QpStructure, data: QpData) -> None:
-        """Set up from nothing."""
+        """Set up anew."""
 
     @abstractmethod
     def _fits(self, data: QpData) -> bool:
@@ -94,7 +94,7 @@ class TimedSolver(ABC):
 
     @abstractmethod
     def _run(self, data: QpData, primal: Floats | None, dual: Floats | None) -> Outcome:
-        """Solve what was set up last; `data` are the same once more."""
+        """Solve the QP set up last; `data` are the same again."""
 
 
 def require(package: str, solver: str) -> ModuleType:
@@ -103,7 +103,7 @@ def require(package: str, solver: str) -> ModuleType:
     Raises
     ------
     InputError
-        If it is not installed; the message says what to install.
+        If it is not installed; the message gives the command to install it.
     """
     try:
         return import_module(package)
@@ -115,5 +115,5 @@ def require(package: str, solver: str) -> ModuleType:
 
 
 def array(values: object) -> Floats:
-    """Copy what a solver returns: most reuse their memory in the next solve."""
+    """Copy a solver's result: most solvers reuse the memory in the next solve."""
     return np.array(values, dtype=float)

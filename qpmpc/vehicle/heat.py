@@ -1,8 +1,8 @@
-"""Heat that leaves the coolant, paper eq. (3): the one text for plant, QP, generated C and DP.
+"""Heat that leaves the coolant, paper eq. (3): one text for plant, QP, generated C and DP.
 
 Each function is one expression in the subset of `qpmpc.qp.expressions`, so that it can be rendered
-in other arithmetic (`in_arithmetic`) and in C (`qpmpc.codegen.rows.c_text`). Whatever has the
-fields of `Thermal` can be `th`.
+in other arithmetic (`in_arithmetic`) and in C (`qpmpc.codegen.rows.c_text`). `th` can be any object
+with the fields of `Thermal`.
 """
 
 from collections.abc import Callable
@@ -52,7 +52,7 @@ FUNCTIONS: tuple[Callable[..., float], ...] = (ua_w_per_k, air_w, radiator_w, ca
 
 
 def in_arithmetic(**functions: Callable[..., Any]) -> dict[str, Any]:
-    """Return the functions of this module with others than Python's `min` and `max`, by name."""
+    """Return the functions of this module with a different `min` and `max`, by name."""
     namespace: dict[str, Any] = dict(functions)
     for function in FUNCTIONS:
         namespace[function.__name__] = FunctionType(function.__code__, namespace)

@@ -1,6 +1,6 @@
 """Vehicle files: shipped ones by name, any by path, each alone or on top of a base.
 
-A file that says ``base = "prius-nimh"``, or the path of another file, needs only its own ``name``
+A file with ``base = "prius-nimh"``, or the path of another file, needs only its own ``name``
 and the keys that differ. Tables are merged key by key; an array is replaced whole.
 """
 
@@ -20,11 +20,11 @@ from qpmpc.vehicle.parameters import Vehicle
 
 @dataclass(frozen=True)
 class VehicleFile:
-    """What stands in one file, before its base is merged in.
+    """Content of one file, before its base is merged in.
 
     Attributes
     ----------
-    label : how errors name it: the shipped vehicle's name, or the path
+    label : its name in errors: the shipped vehicle's name, or the path
     path : None for a shipped vehicle
     text, data : as written, and parsed
     """
@@ -58,7 +58,7 @@ def vehicle_files(name_or_path: str | os.PathLike[str]) -> tuple[VehicleFile, ..
     Raises
     ------
     InputError
-        If one cannot be read or is no TOML, or if the bases go round in a circle.
+        If one cannot be read or is not TOML, or if the bases form a circle.
     """
     files = [_read(name_or_path, "")]
     while "base" in files[-1].data:
@@ -76,7 +76,7 @@ def merged_vehicle(files: tuple[VehicleFile, ...]) -> Vehicle:
     Raises
     ------
     InputError
-        If a key is missing or unknown or a value is not allowed; says in which file.
+        If a key is missing or unknown or a value is not allowed; the message names the file.
     """
     data: dict[str, Any] = {}
     for file in reversed(files):
@@ -88,7 +88,7 @@ def merged_vehicle(files: tuple[VehicleFile, ...]) -> Vehicle:
 
 
 def origins(files: tuple[VehicleFile, ...]) -> dict[str, VehicleFile]:
-    """Map each dotted key to the file whose value counts."""
+    """Map each dotted key to the file whose value applies."""
     return {key: file for file in reversed(files) for key in _dotted_keys(file.data)}
 
 
@@ -101,7 +101,7 @@ def _read_base(file: VehicleFile) -> VehicleFile:
         )
     if base in VEHICLES or file.path is None:
         return _read(base, f"{file.label}: base: ")
-    # relative to the file that names it: a folder of vehicles can be moved as it is
+    # relative to the file that names it, so that a folder of vehicles can be moved
     path = file.path.parent / base
     return _read(path if path.suffix == ".toml" else base, f"{file.label}: base: ")
 

@@ -14,5 +14,5 @@ def _shipped() -> dict[str, Shipped]:
     return {name: Shipped(f"data/{name}.toml") for name in names}
 
 
-# an added name leads to the path of a TOML file
+# the target of an added name is the path of a TOML file
 VEHICLES = Names("vehicle", _shipped(), also=", or a .toml file")

@@ -1,6 +1,6 @@
 """Vehicle parameters: validated, immutable, units in every name.
 
-A vehicle is a TOML file with the sections below, or one with a base and what differs from it
+A vehicle is a TOML file with the sections below, or one with a base and the values that differ
 (`qpmpc.vehicle.load`). ``Vehicle.with_settings`` applies dotted overrides such as
 ``thermal.t_amb_degc=-15``.
 """
@@ -16,7 +16,7 @@ from qpmpc.settings import apply_settings, validated
 
 
 def _check_name(name: str) -> str:
-    """Names become parts of file names and of comments in C."""
+    """Check a name, which becomes part of file names and of comments in C."""
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", name):
         raise ValueError(
             "must begin with a letter or digit and have at most 64 letters, digits, '.', '_', '-'"
@@ -37,7 +37,7 @@ Table = Annotated[tuple[Positive, ...], Field(min_length=2, strict=False)]
 class Section(BaseModel):
     """A group of parameters: no unknown keys, only finite numbers, no change after loading.
 
-    Strict: without it pydantic takes true for 1 and "2" for 2.
+    Strict, because otherwise pydantic takes true for 1 and "2" for 2.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -51,7 +51,7 @@ def _require_increasing(name: str, values: tuple[float, ...]) -> None:
 def _require_same_length(grid: tuple[float, ...], **tables: tuple[float, ...]) -> None:
     for name, table in tables.items():
         if len(table) != len(grid):
-            raise ValueError(f"{name} must have {len(grid)} entries, one a grid point")
+            raise ValueError(f"{name} must have {len(grid)} entries, one per grid point")
 
 
 class Chassis(Section):
@@ -83,7 +83,7 @@ class Engine(Section):
 
     @property
     def lhv_j_per_g(self) -> float:
-        """Lower heating value in the unit that fuel rates are counted in."""
+        """Lower heating value in the unit of fuel rates."""
         return self.lhv_j_per_kg * 1e-3
 
     @model_validator(mode="after")
@@ -175,7 +175,7 @@ class Battery(Section):
 
 
 class Trip(Section):
-    """Where a run starts, and the price of a difference in final SOC."""
+    """Initial state of a run, and the price of a difference in final SOC."""
 
     soc_init: Share
     t_cl_init_degc: Celsius

@@ -1,6 +1,6 @@
 """The plant: one explicit step of SOC and coolant temperature, paper eqs. (1)-(5).
 
-This is the truth that every controller is measured on. Controllers never call it.
+Every controller is measured on this plant. Controllers never call it.
 """
 
 from typing import NamedTuple
@@ -20,18 +20,18 @@ class PlantState(NamedTuple):
 
 
 class Command(NamedTuple):
-    """What a controller asks of the engine for one step."""
+    """A controller's command to the engine for one step."""
 
     engine_on: bool
     p_eng_w: float
 
 
 class StepFlows(NamedTuple):
-    """Every flow of one step, in W unless the name says otherwise; the books must balance.
+    """Every flow of one step, in W unless the name has another unit; the flows must balance.
 
-    `p_bat_w` is what the battery gives at its terminals (discharge positive), `internal_w` what
-    leaves its store, `p_friction_w` what the friction brakes take (electrical side, positive).
-    `power_excess_w` is how far the command exceeds engine or battery power limits.
+    `p_bat_w` is the battery's power at its terminals (discharge positive), `internal_w` the power
+    that leaves its store, `p_friction_w` that of the friction brakes (electrical side, positive).
+    `power_excess_w` is the excess of the command over engine or battery power limits.
     """
 
     fuel_g: float
@@ -79,8 +79,8 @@ class Plant:
 
         Braking power that the battery cannot take goes to the friction brakes; the battery takes
         less than its power limit where more would fill it beyond soc_max within the step. A
-        command beyond the engine's limits is clipped to them; what clipping and the battery leave
-        uncovered is reported as `power_excess_w`.
+        command beyond the engine's limits is clipped to them; power that clipping and the battery
+        leave uncovered is reported as `power_excess_w`.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""A vehicle as the text of a TOML file, complete and with the comments of where it came from."""
+"""A vehicle as the text of a TOML file, complete and with the comments of its sources."""
 
 import json
 import re
@@ -19,14 +19,14 @@ _BESIDE = re.compile(r"""(?:"(?:\\.|[^"\\])*"|'[^']*'|[^"'#])*(#.*)$""")
 
 @dataclass(frozen=True)
 class Comment:
-    """Comments of one key: the lines above it, and what stands beside its value."""
+    """Comments of one key: the lines above it, and the text beside its value."""
 
     above: tuple[str, ...] = ()
     beside: str = ""
 
 
 def vehicle_file_text(name_or_path: str | Path) -> str:
-    """Return a vehicle's file; if it has a base, one file that needs none, with all comments.
+    """Return a vehicle's file, with any base written out and all comments.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def vehicle_file_text(name_or_path: str | Path) -> str:
 
 
 def vehicle_toml(vehicle: Vehicle, comments: Mapping[str, Comment] | None = None) -> str:
-    """Write a vehicle as TOML, each number with all the digits it needs to load back equal.
+    """Write a vehicle as TOML, each number with all digits needed to load back equal.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def comments_of(text: str) -> dict[str, Comment]:
             comment = _BESIDE.match(entry[2])
             beside = comment[1] if comment else ""
         else:
-            if stripped:  # inside of an array or a text: comments there are of no key
+            if stripped:  # inside an array or a string: comments there belong to no key
                 above = []
             continue
         if at_top and above:
@@ -103,7 +103,7 @@ def comments_of(text: str) -> dict[str, Comment]:
 
 
 def _merged_comments(files: tuple[VehicleFile, ...]) -> dict[str, Comment]:
-    """Comments of tables, and of values that count: another's would be about another value."""
+    """Comments of tables, and of values that apply: others would describe other values."""
     counts = origins(files)
     return {
         key: comment

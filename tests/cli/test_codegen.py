@@ -26,7 +26,7 @@ def test_default_is_a_host_project_that_builds(cli, tmp_path):
     stages = settings.horizon.short_stages + settings.horizon.blocks * settings.horizon.classes
     assert done.out == (
         f"{folder}: {len(names)} files written, target host, f32, admm, {stages} stages, "
-        f"{settings.admm.iterations} iterations a step; start with README.md\n"
+        f"{settings.admm.iterations} iterations per step; start with README.md\n"
     )
     assert {"README.md", "NOTICE", "Makefile", "mpc.h", "mpc_admm.c", "mpc_data.c"} <= set(names)
     readme = (folder / "README.md").read_text()

@@ -92,7 +92,7 @@ def counted(
                 "--tool=callgrind",
                 "--callgrind-out-file=count",
                 "--toggle-collect=mpc_step",  # only from its entry to its return
-                "--dump-after=mpc_step",  # one file a call: count.1, count.2, ...
+                "--dump-after=mpc_step",  # one file per call: count.1, count.2, ...
                 "./replay",
                 str(int(settings.mh_qp.prepared)),
             ],

@@ -39,7 +39,7 @@ def rows_of(text: str, columns: int) -> list[list[str]]:
 def measured(
     algorithm: Algorithm, precision: Precision, iterations: int, blocks: int = 0
 ) -> dict[str, float]:
-    """Instructions a step, flash and RAM of a few steps without departure."""
+    """Instructions per step, flash and RAM of a few steps without departure."""
     overrides: dict[str, object] = {
         "mh_qp.admm.iterations": iterations,
         "mh_qp.prepared": False,
@@ -107,7 +107,7 @@ def test_estimated_milliseconds_follow_from_the_instructions() -> None:
 
 
 def test_instructions_over_the_horizon_are_as_documented() -> None:
-    """docs/timing.md: a fixed part, a part a stage, a part a stage and iteration."""
+    """docs/timing.md: a fixed part, a part per stage, a part per stage and iteration."""
     found = re.search(r"instructions = ([\d,]+) \+ n \(([\d,]+) \+ ([\d,]+) K\)", TIMING)
     assert found
     fixed, per_stage, per_iteration = (float(x.replace(",", "")) for x in found.groups())

@@ -115,7 +115,7 @@ def test_misra_findings_are_the_deviations_explained(project) -> None:
 
 
 def test_no_step_does_other_work_than_the_next(project) -> None:
-    """Instructions of a run of good steps grow by the same number a step (callgrind)."""
+    """Instructions of a run of good steps grow by the same number per step (callgrind)."""
     need("gcc", "valgrind")
     (project / "steps.c").write_text(STEPS_C)
     flags = "-std=c99 -O2 -o steps steps.c"

@@ -108,7 +108,7 @@ def test_painted_stack_is_within_the_call_graph_bound(nycc) -> None:
 
 def test_reports_name_what_was_measured_and_what_was_assumed(nycc, tmp_path) -> None:
     text = "\n".join(pil_lines(nycc))
-    assert "ms a step, estimated cycles per instruction 1.0 / 1.5 / 2.5" in text
+    assert "ms per step, estimated cycles per instruction 1.0 / 1.5 / 2.5" in text
     write_pil(nycc, tmp_path)
     lines = (tmp_path / "pil_nycc_f32.csv").read_text().splitlines()
     assert len(lines) == 1 + 598

@@ -86,7 +86,7 @@ def test_a_base_gives_everything_but_the_name(write):
 def test_an_array_alone_must_fit_those_of_the_base(write):
     path = write("mine.toml", 'base = "prius-nimh"\nname = "x"\n[battery]\nsoc_grid = [0, 1]\n')
     assert refusal(path) == (
-        f"{path}: battery: open_circuit_v must have 2 entries, one a grid point "
+        f"{path}: battery: open_circuit_v must have 2 entries, one per grid point "
         "(battery.open_circuit_v in prius-nimh)"
     )
 

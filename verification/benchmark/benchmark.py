@@ -23,9 +23,9 @@ class Benchmark:
 
     Attributes
     ----------
-    drives : one a candidate and cycle
+    drives : one per candidate and cycle
     rows : their figures, in the same order
-    growth : a row a number of stages
+    growth : one row per number of stages
     """
 
     drives: list[Drive]
@@ -44,13 +44,13 @@ class Benchmark:
 
 
 def benchmark(trips: Sequence[Trip], chosen: Sequence[Candidate], next_job: Job) -> Benchmark:
-    """Let every candidate drive every trip, one after the other in one process.
+    """Drive every trip with every candidate, one after the other in one process.
 
     Parameters
     ----------
     trips : all with one vehicle
     chosen : candidates
-    next_job : announces a job and returns where it reports its progress; called
+    next_job : announces a job and returns the function for its progress; called
         len(trips) * (len(chosen) + 1) + 1 times
     """
     drives, rows = [], []

@@ -1,4 +1,4 @@
-"""What is compared: generated C and OSQP at fixed iteration counts, and rivals at a tolerance."""
+"""The candidates: generated C and OSQP at fixed iteration counts, and rivals at a tolerance."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -19,8 +19,8 @@ class Candidate:
 
     Attributes
     ----------
-    label : as it stands in tables
-    family : what it is a member of, for colours and legends
+    label : its name in tables
+    family : its group, for colours and legends
     overrides : dotted settings of the controller
     solver : makes the backend; OSQP with the settings' own values if None
     controller : name of the controller whose settings are used

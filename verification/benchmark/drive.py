@@ -1,4 +1,4 @@
-"""One candidate drives one cycle with its own answers; what it burnt and how long it took."""
+"""One candidate drives one cycle with its own solutions: fuel and times."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from qpmpc.solvers.base import Floats
 from qpmpc.trip import Trip
 from qpmpc.verification.benchmark.candidates import Candidate
 
-ENOUGH_MS = 10e3  # of deciding: no further repetition then
+ENOUGH_MS = 10e3  # of decisions: no further repetition after that
 
 
 @dataclass(frozen=True)
@@ -76,10 +76,10 @@ def drive(
     repetitions: int,
     progress: Progress | None = None,
 ) -> Drive:
-    """Let a candidate drive a trip `repetitions` times, or fewer if that takes long.
+    """Drive a trip with a candidate `repetitions` times, or fewer if that takes long.
 
-    Backends with an iteration limit of their own may need many seconds a cycle; they are driven
-    in full all the same, since a benchmark of one step says nothing about a closed loop.
+    Backends with their own iteration limit may need many seconds per cycle; they are driven in
+    full all the same, since a benchmark of one step says nothing about a closed loop.
     """
     settings = ControllerSettings().with_settings(candidate.overrides)
     steps: list[Floats] = []

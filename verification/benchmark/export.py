@@ -10,10 +10,10 @@
 
 The steps are consecutive: their order makes them a test of warm starting, not only of solving.
 
-``qps_problem_set.npz`` holds the common problem set in the same way; in place of the warm starts
+``qps_problem_set.npz`` holds the common problem set in the same way; instead of the warm starts
 it has ``names``, ``kinds`` and ``solvable``, each (s,).
 
-``qpmpc_recorded.py``, written beside them, makes all of them a test set for qpbenchmark.
+``qpmpc_recorded.py``, written beside them, turns all of them into a test set for qpbenchmark.
 """
 
 from collections.abc import Sequence

@@ -21,11 +21,11 @@ REPETITIONS = 20
 def growth(vehicle: Vehicle) -> list[dict[str, Any]]:
     """Time data update and solve of full-trip QPs at 1 Hz of growing length.
 
-    The road is WLTC class 3b, started over where it ends.
+    The trip is WLTC class 3b, repeated when it ends.
 
     Returns
     -------
-    a row a length: stages, update_ms, solve_ms (medians, ms)
+    one row per length: stages, update_ms, solve_ms (medians, ms)
     """
     settings = MhQpSettings()
     trace = Trip("wltc-3b", vehicle).truth

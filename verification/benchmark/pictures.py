@@ -22,7 +22,7 @@ SHOWN_ABOVE_DP_PERCENT = (0.05, 30.0)
 
 
 def draw_pareto(rows: Sequence[dict[str, Any]]) -> bytes:
-    """Fuel above DP against the worst step, one panel a cycle; returns a PNG."""
+    """Fuel above DP against the worst step, one panel per cycle; returns a PNG."""
     cycles = list(dict.fromkeys(row["cycle"] for row in rows))
     figure = Figure(figsize=(5.4 * len(cycles), 4.6), layout="constrained")
     panels = figure.subplots(1, len(cycles), sharey=True, squeeze=False)[0]
@@ -101,7 +101,7 @@ def draw_growth(rows: Sequence[dict[str, Any]]) -> bytes:
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlabel("stages")
-    axes.set_ylabel("ms a step")
+    axes.set_ylabel("ms per step")
     axes.legend(fontsize=8, frameon=False)
     tidy(axes)
     return png(figure)

@@ -1,4 +1,4 @@
-"""QPs that every backend is tried on: from closed loops, degenerate and infeasible ones too."""
+"""QPs for testing every backend: from closed loops, with degenerate and infeasible ones."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -23,9 +23,9 @@ Kind = Literal["ordinary", "degenerate", "infeasible"]
 
 CITY, CITY_S = "nycc", 150
 HIGHWAY, HIGHWAY_S = "hwfet", 120
-COLD_MARGIN_K = 0.2  # above the coolant's lower limit, so that its slack comes into use
-BARELY = 0.1  # solver units beyond what can be reached: some 0.1 % of SOC, 0.1 K
-INSIDE = 1e-6  # solver units: room left, a hundred times what solvers are asked for
+COLD_MARGIN_K = 0.2  # above the coolant's lower limit, so that its slack is used
+BARELY = 0.1  # solver units beyond the reachable: some 0.1 % of SOC, 0.1 K
+INSIDE = 1e-6  # solver units: room left, a hundred times the solvers' tolerance
 THIRD = 2  # a stage under way
 
 
@@ -36,7 +36,7 @@ class Problem:
     Attributes
     ----------
     kind : a degenerate one has a solution, but is hard to solve for the reason in its name; an
-        infeasible one has none
+        infeasible one has no solution
     """
 
     name: str
@@ -46,7 +46,7 @@ class Problem:
 
 
 def problem_set(vehicle: Vehicle, settings: ControllerSettings | None = None) -> list[Problem]:
-    """Make the set: QPs of two closed loops of `mh-qp`, and what can be made of them.
+    """Make the set: QPs of two closed loops of `mh-qp`, and modifications of them.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def _degenerate(structure: QpStructure, data: QpData) -> Iterator[tuple[str, Kin
 
 
 def _infeasible(structure: QpStructure, data: QpData) -> Iterator[tuple[str, Kind, QpData]]:
-    """QPs that ask for a little more than can be had, and one for much more."""
+    """QPs that demand a little more than is attainable, and one that demands much more."""
     rows, last = structure.rows, structure.stages - 1
     row = last * rows.count + rows.first("box_soc")
     more = _extreme(structure, data, last, Var.SOC) + BARELY
@@ -125,7 +125,7 @@ def _bounded(data: QpData, row: int, lower: float, upper: float) -> QpData:
 
 
 def _in_row(structure: QpStructure, data: QpData, row: int, value: float) -> float:
-    """Value of a row whose first entry meets that value, its other entries zero."""
+    """Value of a row whose first variable has that value and the others are zero."""
     return float(structure.matrix_of(data.a_data)[row].data.max() * value)
 
 
@@ -146,7 +146,7 @@ def _row_twice(structure: QpStructure, data: QpData) -> QpData:
 def _extreme(
     structure: QpStructure, data: QpData, stage: int, var: Var, highest: bool = True
 ) -> float:
-    """Highest or lowest value of a variable that any feasible point has, solver units."""
+    """Highest or lowest value of a variable over all feasible points, solver units."""
     cost = np.zeros(structure.shape[1])
     cost[stage * VARS + var] = -1.0 if highest else 1.0
     a = structure.matrix_of(data.a_data)

@@ -4,10 +4,10 @@ Keep this file beside the ``qps_*.npz`` files that it reads, then, with qpbenchm
 
     qpbenchmark --results-path results.csv qpmpc_recorded.py run
 
-It needs nothing of the package that wrote it. The files hold every step of a trip, in order, for
+It does not need the package that wrote it. The files hold every step of a trip, in order, for
 tests of warm starting as well; qpbenchmark starts cold, so one step in `EVERY` is enough for it.
 ``qps_problem_set.npz`` has degenerate QPs; its infeasible ones are left out here, since
-qpbenchmark counts what is not solved as a failure.
+qpbenchmark counts an unsolved QP as a failure.
 """
 
 from collections.abc import Iterator, Mapping
@@ -27,7 +27,7 @@ class QpmpcRecorded(TestSet):  # type: ignore[misc]
     @property
     def description(self) -> str:
         """One sentence for the report."""
-        return "QPs that a predictive controller of a hybrid car solves, one a second, on its way."
+        return "QPs that a predictive controller of a hybrid car solves, one per second of a trip."
 
     @property
     def title(self) -> str:
@@ -54,7 +54,7 @@ class QpmpcRecorded(TestSet):  # type: ignore[misc]
 
 
 def problem(data: Mapping[str, Any], k: int, name: str) -> Problem:
-    """1/2 x'Px + q'x  s.t.  G x <= h, A x = b: the sides of lower <= A x <= upper taken apart."""
+    """1/2 x'Px + q'x  s.t.  G x <= h, A x = b: the sides of lower <= A x <= upper separated."""
     lower, upper, q = data["lower"][k], data["upper"][k], data["q"][k]
     shape = len(lower), len(q)
     a = sp.csc_matrix((data["a_data"][k], data["a_indices"], data["a_indptr"]), shape=shape)

@@ -14,7 +14,7 @@ from qpmpc.trip import Trip
 
 @dataclass(frozen=True)
 class Recording:
-    """The QPs of one run, in order: several at departure, then one a step.
+    """The QPs of one run, in order: several at departure, then one per step.
 
     Attributes
     ----------

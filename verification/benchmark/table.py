@@ -7,7 +7,7 @@ from rich.table import Table
 
 
 def benchmark_table(rows: Sequence[dict[str, Any]]) -> Table:
-    """Return one line a candidate and cycle; times in ms."""
+    """Return one line per candidate and cycle; times in ms."""
     table = Table(title="Accuracy against speed (times in ms; max: median over repetitions)")
     table.add_column("cycle")
     table.add_column("candidate")

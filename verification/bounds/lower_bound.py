@@ -5,19 +5,19 @@ the limits and every price lam >= 0 of energy satisfy
 
     fuel + lam (W_0 - W_n) >= L(lam) = min sum_k h [ alpha(T_k) f(p_k) + lam G(P_k) ]
 
-over all engine commands, with the coolant's dynamics kept and the SOC's left to its price
+over all engine commands, with the coolant's dynamics kept and those of SOC left to its price
 (Lagrangian relaxation). `lower_bound` maximises L over lam. Where SOC_n >= SOC_0 the left side is
 at most the fuel, so that L is a lower bound on it. No convexity is assumed, nothing linearised.
 
 L(lam) is computed by dynamic programming over the coolant temperature alone; all its
-approximations err to the low side:
+approximations err on the low side:
 
 - G(P) is the least internal power over soc_min..soc_max, less U' h I^2 / (2 C_bat), because the
   plant takes U_oc at the start of its explicit step
 - the radiator is left out, and a full battery, start fuel and engine off at full demand cost
   nothing; the cabin takes its least heat. A warmer coolant never costs more, so heat may be
-  thrown away, and what would exceed T_max is
-- T_min may be left by one grid cell, at the price that heat has at the edge
+  thrown away, and heat beyond T_max is
+- T_min may be undercut by one grid cell, at the price of heat at the edge
 - between the grid points in T and p the value is interpolated, and the most that this can be too
   high is subtracted, action by action: a quarter of the convex kink of the value that lies in the
   cell's image, the sag of alpha between temperatures and those of f and G between powers.
@@ -56,7 +56,7 @@ class LowerBound:
     ----------
     fuel_g : L; fuel + price (W_0 - W_n) of any run is at least this
     price_g_per_j : lam
-    numerical_g : what was subtracted for interpolation; with a finer grid the bound would rise by
+    numerical_g : amount subtracted for interpolation; with a finer grid the bound would rise by
         about this
     """
 
@@ -66,7 +66,7 @@ class LowerBound:
 
 
 class _Tables(NamedTuple):
-    """What the recursion needs; the first power stands for the engine off."""
+    """Data of the recursion; the first power means the engine off."""
 
     internal_w: Floats  # (steps, powers), infinite where not allowed
     ua_w_per_k: Floats  # (steps,)
@@ -90,14 +90,14 @@ def lower_bound(cycle: Cycle, vehicle: Vehicle) -> LowerBound:
 
     Parameters
     ----------
-    cycle : what is driven
+    cycle : the cycle driven
     vehicle : the plant; the run starts at `vehicle.trip` and keeps the limits of SOC, coolant,
         engine and battery
 
     Raises
     ------
     InputError
-        If the trip starts outside the coolant limits, which the bound takes as kept throughout.
+        If the trip starts outside the coolant limits, which the bound assumes to be kept.
     """
     th, start = vehicle.thermal, vehicle.trip.t_cl_init_degc
     if not th.t_cl_min_degc <= start <= th.t_cl_max_degc:
@@ -201,7 +201,7 @@ def _tables(cycle: Cycle, vehicle: Vehicle) -> _Tables:
 
 
 def _least_internal_w(vehicle: Vehicle, power_w: Floats) -> Floats:
-    """Least energy a second that leaves the store at a terminal power, over the SOC range."""
+    """Least energy per second that leaves the store at a terminal power, over the SOC range."""
     equations, battery = Equations(vehicle), vehicle.battery
     soc = np.linspace(battery.soc_min, battery.soc_max, SOC_POINTS)
     soc = np.union1d(soc, [s for s in battery.soc_grid if soc[0] < s < soc[-1]])

@@ -1,8 +1,8 @@
-"""The convex model's own view of a whole trip: one relaxed QP at 1 Hz, linearised to convergence.
+"""The convex model of a whole trip: one relaxed QP at 1 Hz, linearised to convergence.
 
-Unlike `lower_bound` this is no proof: alpha(T) F is expanded about the solution itself and the
-battery has the resistance of its initial SOC. It shows what the convex model promises, and how
-near to on or off the relaxed engine is when nothing is averaged.
+Unlike `lower_bound` this is not a proof: alpha(T) F is expanded about the solution itself and the
+battery has the resistance of its initial SOC. It shows the fuel of the convex model, and how near
+to on or off the relaxed engine is when nothing is averaged.
 """
 
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class RelaxedTrip:
     ----------
     fuel_g : sum h alpha(T) F
     integral_share : share of seconds whose on-share is within 0.02 of 0 or 1
-    rounds : linearisations until fuel stood still
+    rounds : linearisations until the fuel converged
     """
 
     fuel_g: float

@@ -1,7 +1,7 @@
-"""``qpmpc verify``: what the convex model loses, and whether the code is the mathematics claimed.
+"""``qpmpc verify``: the losses of the convex model, and the code against its equations.
 
-Each check recomputes what it needs from the equations (`verification.independent`) and does not
-call the function that it checks.
+Each check recomputes its data from the equations (`verification.independent`) and does not call
+the function that it checks.
 """
 
 from qpmpc.verification.checks.check import Check

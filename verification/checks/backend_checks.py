@@ -1,4 +1,4 @@
-"""Every installed backend on the same QPs: the same cost, and no claim where none has one."""
+"""Every installed backend on the same QPs: the same cost, and no solution to infeasible QPs."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -17,15 +17,15 @@ from qpmpc.verification.checks.context import Context
 from qpmpc.verification.checks.qp_checks import exact, samples
 from qpmpc.verification.renderings.kkt import kkt_residuals, objective
 
-QUICK_BACKENDS = ("osqp", "piqp", "clarabel", "daqp", "qoco")  # the others take seconds a QP
+QUICK_BACKENDS = ("osqp", "piqp", "clarabel", "daqp", "qoco")  # the others take seconds per QP
 QUICK_TRIP = "city"  # of the problem set
-TOLERANCE = 1e-8  # that solvers are asked for, in their own measures
+TOLERANCE = 1e-8  # set in the solvers, in their own measures
 AGREE = 1e-6  # relative cost
 # first-order, or stopping at larger residuals
 LOOSE = {"osqp": 1e-4, "scs": 1e-5, "highs": 1e-5, "proxqp": 1e-5}
 RESIDUAL, LOOSE_RESIDUAL = 1e-5, {"osqp": 1e-3, "scs": 1e-2}  # of the largest dual
 CYCLING = ("highs",)  # see `qpmpc.solvers.highs`
-# As in a car it makes 50 iterations, from a warm start, and need not say when it is done
+# In a car it makes 50 iterations from a warm start and need not detect convergence
 TO_THE_END = AdmmSettings(cold_iterations=100_000, status_tolerance=1e-7)
 
 
@@ -48,7 +48,7 @@ def recorded_qps(context: Context) -> Iterator[Check]:
 
 
 def common_problems(context: Context) -> Iterator[Check]:
-    """Backends on the problem set: the same cost where there is a solution, else no claim."""
+    """Backends on the problem set: the same cost if there is a solution, else none reported."""
     problems = [
         p
         for p in problem_set(context.vehicle, context.settings)
@@ -127,7 +127,7 @@ def _infeasible(name: str, problems: Sequence[Problem]) -> Check:
         detail += f"; claimed: {', '.join(claimed)}"
     return Check(
         f"Infeasible QPs, {name}",
-        "No QP without a solution is called solved.",
+        "No QP without a solution is reported as solved.",
         0.0,
         float(len(claimed)),
         "QPs",

@@ -1,4 +1,4 @@
-"""Books of closed-loop runs: power, charge, fuel and heat, second by second."""
+"""Balances of closed-loop runs: power, charge, fuel and heat, second by second."""
 
 from collections.abc import Iterator
 
@@ -17,7 +17,7 @@ TABLE_STEP_W = 50.0
 
 
 def _imbalances(run: Run, cycle: Cycle) -> dict[str, tuple[Floats, Floats]]:
-    """What should agree, second by second, recomputed from the trajectory's states and powers."""
+    """Both sides of each balance, second by second, recomputed from the trajectory."""
     tr, vehicle, eq = run.trajectory, run.vehicle, Equations(run.vehicle)
     th, engine = vehicle.thermal, vehicle.engine
     soc, t = tr.soc[:-1], tr.t_cl_degc[:-1]

@@ -1,4 +1,4 @@
-"""One check: what is claimed, what was measured, and whether the claim holds."""
+"""One check: the claim, the measured value, and whether the claim holds."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -12,13 +12,13 @@ class Check:
     Attributes
     ----------
     name : short, unique
-    claim : what must hold, in one sentence
+    claim : the requirement, in one sentence
     tolerance : largest allowed value
-    measured : what was found
+    measured : the value found
     unit : of both; empty for plain numbers
-    detail : anything a reader needs in order to judge the figure
+    detail : anything that a reader needs to judge the figure
     at_least : the tolerance is the least allowed value
-    skipped : it could not be tried on this machine, for the reason that `detail` gives
+    skipped : it could not be run on this machine, for the reason in `detail`
     """
 
     name: str
@@ -32,7 +32,7 @@ class Check:
 
     @property
     def passed(self) -> bool:
-        """Whether the claim holds, as far as it was tried."""
+        """Whether the claim holds, as far as it was tested."""
         if self.skipped:
             return True
         if not isfinite(self.measured):

@@ -1,4 +1,4 @@
-"""What the checks share: vehicles, cycles, and closed loops with all their QPs, made once."""
+"""Data shared by the checks: vehicles, cycles, and closed loops with all their QPs, made once."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -52,7 +52,7 @@ class Loop:
 
 
 class Context:
-    """Runs shared by all checks; nothing is computed before it is asked for.
+    """Runs shared by all checks; each is computed on first use.
 
     Parameters
     ----------

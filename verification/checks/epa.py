@@ -2,7 +2,7 @@
 
 Run it with ``python -m qpmpc.verification.checks.epa``. EPA's figures are unadjusted miles per
 gallon from its test-car list for the 2016 Prius; the plant was fitted to them with few free
-numbers, so this shows how well the structure holds, not an independent validation.
+numbers, so this shows that the structure is consistent; it is not an independent validation.
 """
 
 import sys
@@ -52,7 +52,7 @@ class EpaCase:
     Attributes
     ----------
     epa_mpg : measured by EPA
-    reference_mpg : what this plant's equations gave when its free numbers were fitted
+    reference_mpg : result of this plant's equations when its free numbers were fitted
     vehicle, rules : overrides
     """
 

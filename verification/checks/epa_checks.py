@@ -24,7 +24,7 @@ def epa_figures(context: Context) -> Iterator[Check]:
         )
         yield Check(
             f"Plant as fitted, {case.name}",
-            "Fuel economy is what the plant gave when its free numbers were fitted.",
+            "Fuel economy is that of the plant when its free numbers were fitted.",
             100.0 * TOLERANCE,
             100.0 * abs(mpg / case.reference_mpg - 1.0),
             "%",

@@ -8,8 +8,8 @@ from qpmpc.verification.checks.check import Check
 from qpmpc.verification.checks.context import Context
 
 EVERY = 15  # steps from one state compared to the next
-# What 50 iterations, the PWA curves and expanding alpha(T) F may cost together. Near the optimum
-# the cost is flat: plans differ more than their fuel.
+# Allowed cost of 50 iterations, the PWA curves and the expansion of alpha(T) F together. Near the
+# optimum the cost is flat: plans differ more than their fuel.
 SAME_ON_OFF_PERCENT = 90.0
 FIRST_POWER_W = 1000.0  # of some 10 kW while the engine runs
 SOC = 0.05  # of the 0.4 that the battery may use
@@ -40,7 +40,7 @@ def plans_beside_the_nonlinear_program(context: Context) -> Iterator[Check]:
         result = found.summary()
         yield Check(
             f"First command, on or off, {name}",
-            "Both programs want the engine on, or both want it off, in the second ahead.",
+            "Both programs plan the engine on, or both plan it off, in the second ahead.",
             SAME_ON_OFF_PERCENT,
             100.0 * result["same_on_off_share"],
             "% of states",
@@ -50,7 +50,7 @@ def plans_beside_the_nonlinear_program(context: Context) -> Iterator[Check]:
         for title, claim, key, of, tolerance, unit in (
             (
                 "First command, power",
-                "In the mean over states, both programs want the same engine power at first.",
+                "In the mean over states, both programs plan the same first engine power.",
                 "first_power_w",
                 "mean",
                 FIRST_POWER_W,

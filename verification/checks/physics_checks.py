@@ -1,4 +1,4 @@
-"""What physics demands whatever the numbers: monotonicity, closed forms, units."""
+"""Requirements of physics, independent of the numbers: monotonicity, closed forms, units."""
 
 from collections.abc import Iterator
 
@@ -75,7 +75,7 @@ def uncoupled(context: Context) -> Iterator[Check]:
 
 
 def thermostat_exact(context: Context) -> Iterator[Check]:
-    """Coolant over long stages, the thermostat opening and closing on the way."""
+    """Coolant over long stages in which the thermostat opens or closes."""
     thermal, equations = context.vehicle.thermal, Equations(context.vehicle)
     rng = np.random.default_rng(7)
     duration = rng.choice([1.0, 20.0, 60.0, 200.0], STAGES_TRIED)
@@ -95,8 +95,8 @@ def thermostat_exact(context: Context) -> Iterator[Check]:
     closed = np.count_nonzero((start > opens) & (end < 0.0))
     yield Check(
         "Thermostat within a stage",
-        "Coolant at the end of a stage, and what a kW or a kelvin more makes of it, are those of "
-        "the two linear regimes driven through one after the other.",
+        "Coolant at the end of a stage, and its change for a kW or a kelvin more, are those of the "
+        "two linear regimes one after the other.",
         THERMOSTAT_K,
         worst,
         "K",
@@ -138,7 +138,7 @@ def constant_demand(context: Context) -> Iterator[Check]:
         shown.append(f"{net_w / 1e3:g} kW: {rate:.5f} g/s, expected {expected:.5f}")
     yield Check(
         "Constant demand",
-        "The QP's fuel rate at constant demand is the closed form's.",
+        "The QP's fuel rate at constant demand is that of the closed form.",
         2e-4,
         worst,
         "relative",
@@ -147,7 +147,7 @@ def constant_demand(context: Context) -> Iterator[Check]:
 
 
 def engine_covers_demand(context: Context) -> Iterator[Check]:
-    """The engine gives exactly what is asked: SOC stays, fuel is the curve's."""
+    """The engine gives exactly the demand: SOC stays, fuel is the curve's."""
     from qpmpc.vehicle import Command, Plant
 
     vehicle, equations = context.vehicle, Equations(context.vehicle)

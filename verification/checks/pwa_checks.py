@@ -1,4 +1,4 @@
-"""PWA curves: the error bounds that they claim, and what those mean for a trip."""
+"""PWA curves: their claimed error bounds, and the resulting errors of a trip."""
 
 from collections.abc import Callable, Iterator
 

@@ -1,4 +1,4 @@
-"""The QP: the same stages, the same problem and the same optimum as written down a second time."""
+"""The QP: the same stages, problem and optimum as in the independent second version."""
 
 from collections.abc import Iterator
 
@@ -26,7 +26,7 @@ from qpmpc.verification.independent.stage_program import (
 
 EXACT = "piqp"
 QUICK_SAMPLES, FULL_SAMPLES = 12, 60
-AGREE = 1e-5  # relative fuel; solvers are asked for 1e-8 in their own measures
+AGREE = 1e-5  # relative fuel; solvers are set to 1e-8 in their own measures
 REGULARISED = 5e-5  # relative fuel that the QP's quadratic regularisation may cost
 
 
@@ -52,7 +52,7 @@ def stages_agree(context: Context) -> Iterator[Check]:
                 worst = max(worst, float(np.max(np.abs(a - b)) / max(np.abs(b).max(), 1.0)))
         yield Check(
             f"Stages of the horizon, {loop.name}",
-            "Durations, P0, speeds and l(P0) are the means over the seconds that they stand for.",
+            "Durations, P0, speeds and l(P0) are the means over the seconds that they represent.",
             1e-9,
             worst,
             "relative",

@@ -25,7 +25,7 @@ def relaxation_tight(context: Context) -> Iterator[Check]:
             100.0 * float(np.mean(gap)),
             "%",
             f"largest {100.0 * float(gap.max()):.2f} %, at {context.settings.mh_qp.admm.iterations}"
-            " iterations a step",
+            " iterations per step",
         )
         integral = float(np.mean((sigma < INTEGRAL) | (sigma > 1.0 - INTEGRAL)))
         yield Check(
@@ -61,7 +61,7 @@ def expansion_error(loop: Loop, step: int) -> tuple[float, float]:
 
 
 def expansion_small(context: Context) -> Iterator[Check]:
-    """One linearisation a step is enough: the expansion is exact to second order."""
+    """One linearisation per step is enough: the expansion is exact to second order."""
     for loop in context.loops:
         errors = [expansion_error(loop, k) for k in range(1, loop.trip.steps)]
         burning = [(error, fuel) for error, fuel in errors if fuel > 1.0]

@@ -1,4 +1,4 @@
-"""What the convex relaxation gives away over a whole trip, with nothing averaged."""
+"""The loss by the convex relaxation over a whole trip, with nothing averaged."""
 
 from collections.abc import Iterator
 
@@ -23,8 +23,8 @@ def relaxed_trip_close(context: Context) -> Iterator[Check]:
             CLOSE_PERCENT,
             100.0 * abs(relaxed.fuel_g / optimum.fuel_g - 1.0),
             "%",
-            f"{relaxed.fuel_g:.3f} g, dp {optimum.fuel_g:.3f} g; the model's own figure, no proven "
-            f"bound, after {relaxed.rounds} linearisations",
+            f"{relaxed.fuel_g:.3f} g, dp {optimum.fuel_g:.3f} g; the model's own figure, not a "
+            f"proven bound, after {relaxed.rounds} linearisations",
         )
         yield Check(
             f"Relaxed trip integral, {name}",

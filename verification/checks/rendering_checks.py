@@ -1,4 +1,4 @@
-"""The other renderings of QP and controller, fed with what the closed loops saw."""
+"""The other renderings of QP and controller, with the inputs of the closed loops."""
 
 from collections.abc import Iterator
 from math import nan
@@ -18,9 +18,9 @@ ENTRIES = 1e-12  # of rows of unit norm, in solver units: some hundred roundings
 OPTIMUM = 1e-6
 NAMES = {
     "cvxpy": "The QP compiled by cvxpy",
-    "c": "The QP that the generated C holds, asked of its own solver,",
+    "c": "The QP in the generated C, read through its own solver,",
 }
-F64_W = 1e-3  # after hundreds of steps of warm starts, each from the last
+F64_W = 1e-3  # after hundreds of steps, each warm-started from the last
 NO_COMPILER = "no C compiler here"
 CLAIM = "Fed with the same measurements, generated C commands the same power as Python."
 

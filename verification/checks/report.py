@@ -1,4 +1,4 @@
-"""The HTML report of a verification: one file that needs nothing else."""
+"""The HTML report of a verification: one self-contained file."""
 
 from dataclasses import dataclass, field
 from importlib.resources import files

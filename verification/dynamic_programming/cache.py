@@ -1,4 +1,4 @@
-"""Results on disk, keyed by everything that decides them."""
+"""Results on disk, keyed by all their inputs."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""What dynamic programming returns."""
+"""The result of dynamic programming."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -13,8 +13,8 @@ Bools = NDArray[np.bool_]
 class DpLevel(NamedTuple):
     """One grid that was solved.
 
-    `fuel_g` is what the plant burns under its policy, `value_g` what its value function promises
-    at the start; `clearance` is the least distance of the trajectory from the edges of the tube
+    `fuel_g` is the plant's fuel under its policy, `value_g` the value function at the start;
+    `clearance` is the least distance of the trajectory from the edges of the tube
     that are not limits, in half widths (1 for the coarse grid, which has no such edge).
     """
 
@@ -38,7 +38,7 @@ class DpSolution:
 
     fuel saved later by a unit of SOC, or a kelvin of coolant, more now. In the final stretch with
     the engine off only the final-SOC constraint holds the state: lambda_SOC keeps its last value
-    (the constraint's multiplier) and lambda_T is zero, the heat left has no use.
+    (the constraint's multiplier) and lambda_T is zero: the remaining heat has no use.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class DpSolution:
 
     @property
     def value_g(self) -> float:
-        """Fuel promised by the value function at the start, g; biased upwards by interpolation."""
+        """Fuel by the value function at the start, g; biased upwards by interpolation."""
         return self.levels[-1].value_g
 
     @property

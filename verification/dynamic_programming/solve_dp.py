@@ -22,7 +22,7 @@ def solve_dp(
 
     Parameters
     ----------
-    cycle : what is driven
+    cycle : the cycle driven
     vehicle : the plant; `trip` gives the start, and the final SOC must not be below the first
     settings : grids, `DpSettings()` if None
     progress : called with the finished fraction, 0 to 1

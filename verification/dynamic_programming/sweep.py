@@ -71,7 +71,7 @@ class Sweep:
         return forward.result()
 
     def step(self, k: int) -> Step:
-        """Gather what step k asks for."""
+        """Gather the data of step k."""
         problem = self.problem
         soc, t_cl = self.coast
         return Step(

@@ -1,4 +1,4 @@
-"""What the plant does under the policy of one grid."""
+"""The plant's trajectory under the policy of one grid."""
 
 from dataclasses import dataclass
 
@@ -9,8 +9,7 @@ from qpmpc.verification.dynamic_programming.kernels import Bools, Floats
 class Trajectory:
     """States, commands, fuel and costates; arrays as in `DpSolution`.
 
-    `value_g` is what the value function promises at the start, `admissible` whether every limit
-    could be kept.
+    `value_g` is the value function at the start, `admissible` whether every limit could be kept.
     """
 
     soc: Floats

@@ -1,1 +1,1 @@
-"""A second writing of the model and of the QP, from the equations alone, as evidence."""
+"""A second version of the model and of the QP, from the equations alone, as evidence."""

@@ -13,7 +13,7 @@ from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
 
-SPEED_STEP_RPM = 5.0  # the plant takes the best speed of a grid this fine
+SPEED_STEP_RPM = 5.0  # the plant uses the best speed of a grid this fine
 GRAVITY_MPS2 = 9.81
 
 
@@ -45,7 +45,7 @@ class Equations:
         return np.asarray(force * mean * factor)
 
     def net_w(self, cycle: Cycle) -> Floats:
-        """P0 = P_d + P_aux within what battery and engine can take and give."""
+        """P0 = P_d + P_aux within the limits of battery and engine."""
         battery = self.vehicle.battery
         net = self.demand_w(cycle) + battery.aux_power_w
         net = np.maximum(net, -battery.power_charge_max_w)
@@ -60,7 +60,7 @@ class Equations:
         rpm = np.linspace(low, high, round((high - low) / SPEED_STEP_RPM) + 1)
         torque = np.interp(rpm, engine.torque_speed_rpm, engine.torque_max_nm)
         most_w = torque * rpm * np.pi / 30.0
-        # litres a second, times the friction work of a litre and revolution
+        # litres per second, times the friction work of a litre and revolution
         swept = engine.displacement_l * rpm / 60.0
         friction_w = (
             1000.0 * swept * np.interp(rpm, engine.friction_speed_rpm, engine.friction_kj_per_rev_l)
@@ -119,10 +119,10 @@ class Equations:
         return np.asarray(np.interp(t, fades, [0.0, th.cabin_heat_w]))
 
     def coolant_after_degc(self, duration_s: float, t_cl_degc: float, heat_w: float) -> float:
-        """T after a stage of constant heat, the thermostat opening or closing on the way.
+        """T after a stage of constant heat in which the thermostat opens or closes.
 
-        The radiator's heat grows linearly from nothing at T_open to its full power at T_max; the
-        two linear regimes are driven through one after the other.
+        The radiator's heat grows linearly from zero at T_open to its full power at T_max; the two
+        linear regimes follow one after the other.
         """
         th = self.vehicle.thermal
         capacity = th.heat_capacity_j_per_k

@@ -1,7 +1,7 @@
 """The multi-horizon problem written a second time: stages and QP, from equations, in SI units.
 
-Plain loops, stage by stage, with nothing of `qpmpc.qp` or `qpmpc.preview`: what they make must
-agree with this.
+Plain loops, stage by stage, without `qpmpc.qp` or `qpmpc.preview`: their results must agree with
+this.
 """
 
 from dataclasses import dataclass
@@ -37,8 +37,8 @@ class Horizon:
 def horizon(cycle: Cycle, vehicle: Vehicle, settings: MhQpSettings, step: int) -> Horizon:
     """Stages at one time step, from the cycle, for an exact forecast.
 
-    The next N seconds one by one; then of each block what is left of it after those, split into
-    hard, easy and braking seconds.
+    The next N seconds one by one; then the rest of each block after those, split into hard, easy
+    and braking seconds.
     """
     grid, equations = settings.horizon, Equations(vehicle)
     demand, net = equations.demand_w(cycle), equations.net_w(cycle)
@@ -97,7 +97,7 @@ def expansion(previous: Floats, settings: MhQpSettings, t_cl_degc: float) -> Exp
 
 
 def shifted(values: Floats, settings: MhQpSettings) -> Floats:
-    """Stage values of the step before, moved to the stages that stand for the same seconds."""
+    """Stage values of the previous step, moved to the stages of the same seconds."""
     n = settings.horizon.short_stages
     return np.concatenate([values[1:n], values[n - 1 : n], values[n:]])
 
@@ -106,7 +106,7 @@ def shifted(values: Floats, settings: MhQpSettings) -> Floats:
 class StageProgram:
     """min cost x  s.t.  equal x = equal_to, upper x <= upper_to, in SI units and grams.
 
-    `names` says what each inequality is.
+    `names` names each inequality.
     """
 
     cost: Floats
@@ -160,7 +160,7 @@ class _Rows:
 
 @dataclass(frozen=True)
 class Curves:
-    """Fitted curves that the problem is made of."""
+    """Fitted curves of the problem."""
 
     fuel: PwaFit
     battery: PwaFit

@@ -38,7 +38,7 @@ class PlanPair:
     qp_power_w, nlp_power_w : engine power of the first second, mean over it (E)
     soc_difference : largest difference of the predicted SOC, over all stages
     t_cl_difference_k : the same of the coolant, up to the last stage in which fuel is planned;
-        after it heat has no more use, and the QP leaves it undetermined
+        after it heat has no use, and the QP leaves it undetermined
     qp_fuel_g, nlp_fuel_g : planned fuel to arrival
     """
 

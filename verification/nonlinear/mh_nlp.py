@@ -37,7 +37,7 @@ class MhNlpSettings(BaseModel):
 
 
 class MhNlp(Planner):
-    """Multi-horizon MPC as a nonlinear program, solved to the end by IPOPT at every step.
+    """Multi-horizon MPC as a nonlinear program, solved to convergence by IPOPT at every step.
 
     Parameters
     ----------
@@ -87,13 +87,13 @@ class MhNlp(Planner):
         return Plan(on_share, powers_w, True, solved.iterations)
 
     def forget(self) -> None:
-        """Forget the last solution, as after a restart of the controller on the road."""
+        """Forget the last solution, as after a restart of the controller under way."""
         self._last = None
 
     def solve(self, seen: Observation) -> NlpPlan:
         """Solve the program of this second, warm from the last plan if there is one.
 
-        Where the warm start fails, the step is solved again from nothing.
+        If the warm start fails, the step is solved again from cold.
         """
         stages = self.preview.at(seen.step)
         start = self._last

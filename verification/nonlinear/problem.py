@@ -19,14 +19,14 @@ Floats = NDArray[np.float64]
 
 
 class NlpVar(IntEnum):
-    """Variables of a stage, in solver units (`UNIT` says how much SI one of them is).
+    """Variables of a stage, in solver units (`UNIT` has the size of one in SI).
 
     Those of the QP, in its places; fuel and internal power are maps here, and slack follows.
     """
 
     SOC = Var.SOC
     T_CL = Var.T_CL
-    ABOVE = Var.P_ENG  # D, mean engine power above the least it can run at, W
+    ABOVE = Var.P_ENG  # D, mean engine power above the least running power, W
     ON = Var.ON
     T_SLACK = Var.ON + 1
 
@@ -35,7 +35,7 @@ NLP_VARS = len(NlpVar)
 UNIT = np.array([0.01, 1.0, 10e3, 1.0, 1.0])
 
 SOC_ROW = 2  # of the rows of a stage, the limit that may have to give way
-SIGMA_LEAST = 1e-4  # keeps the power of an engine that is off at its best value, ready to go on
+SIGMA_LEAST = 1e-4  # keeps the power of an engine that is off at its best value
 SOC_SHORTFALL_G = 5000.0  # price of a unit of SOC missed, over ten times its worth in fuel
 WASTE_G = 0.01  # price of 0.01 of SOC thrown away, far below its worth: keeps SOC determined
 # g per stage, on squared power, on-share and slack in solver units
@@ -157,10 +157,10 @@ class NlpProblem:
         return ca.Function("stage", [before, x, road], [h * fuel, soc_gain, t_cl_gap])
 
     def _coolant_after(self, t_cl_degc: Any, h: Any, heat_w: Any, steps: int) -> Any:
-        """T after a stage of constant heat, the thermostat opening or closing on the way.
+        """T after a stage of constant heat in which the thermostat opens or closes.
 
         C dT/dt = q - Q_rad(T), each of the steps exact for Q_rad linear about its start: stable
-        however long it is.
+        for any length.
         """
         ca, capacity = casadi(), self.vehicle.thermal.heat_capacity_j_per_k
         at = ca.SX.sym("at")
@@ -174,7 +174,7 @@ class NlpProblem:
         return t_cl_degc
 
     def _row_bounds(self) -> tuple[Floats, Floats]:
-        """Bounds of the rows, but for the lower limits of SOC, which change."""
+        """Bounds of the rows, except the lower limits of SOC, which change."""
         thermal, settings = self.vehicle.thermal, self.settings
         lower, upper = np.full((self.stages, 6), -np.inf), np.full((self.stages, 6), np.inf)
         lower[:, [0, 1, 5]], upper[:, 1] = 0.0, 0.0
@@ -187,7 +187,7 @@ class NlpProblem:
 
         Parameters
         ----------
-        stages : the road ahead
+        stages : the trip ahead
         soc, t_cl_degc : state at its start
         on_off_g : price of sigma (1 - sigma) in the short stages, g
         """
@@ -223,7 +223,7 @@ class NlpProblem:
         )
 
     def _soc_low(self, stages: Stages, soc: float) -> Floats:
-        """Lower limits of SOC, with the QP's reserve, as far as charging all the way reaches."""
+        """Lower limits of SOC, with the QP's reserve, as far as charging throughout reaches."""
         battery, trip, settings = self.vehicle.battery, self.vehicle.trip, self.settings
         reserve = settings.soc_reserve * max(trip.soc_init - battery.soc_min, 0.0)
         low = battery.soc_min + np.where(stages.duration_s > ACCURATE_STAGE_S, reserve, 0.0)

@@ -44,7 +44,7 @@ class NlpPlan:
     stages : the horizon
     power_least_w : least power of a running engine, shape (n,)
     z : variables in solver units, shape (n, NLP_VARS)
-    missing, bound_duals, row_duals : what a warm start needs besides
+    missing, bound_duals, row_duals : further data of a warm start
     cost_g : objective
     solved : whether IPOPT reached its tolerance
     iterations : of IPOPT
@@ -109,11 +109,11 @@ class NlpSolver:
         start: NlpPlan | None = None,
         on_off_g: float = 0.0,
     ) -> NlpPlan:
-        """Solve for a horizon and a state, from `start`, or from nothing.
+        """Solve for a horizon and a state, from `start`, or from cold.
 
         Parameters
         ----------
-        stages : the road ahead
+        stages : the trip ahead
         soc, t_cl_degc : state at its start
         start : plan to start from
         on_off_g : price of sigma (1 - sigma) in the short stages

@@ -1,4 +1,4 @@
-"""What cvxpy hands to a solver for the twin, brought back to the QP's own variables."""
+"""The twin as cvxpy passes it to a solver, transformed back to the QP's own variables."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 def cvxpy_matrices(twin: CvxpyTwin) -> Matrices:
     """Matrices of the twin at its last update, as compiled by cvxpy for a conic solver.
 
-    cvxpy adds variables of its own: the state now, which a row fixes, and copies of expressions
+    cvxpy adds its own variables: the state now, which a row fixes, and copies of expressions
     under a square. Both are eliminated.
     """
     data, _, _ = twin.problem.get_problem_data("CLARABEL")
@@ -45,7 +45,7 @@ def _reduced(data: dict[str, Any], ours: NDArray[np.intp], unit: Floats) -> Matr
     defining = np.flatnonzero((left[:, copies] != 0.0).any(axis=1))
     rows = np.concatenate([pins, defining])
     if len(rows) != len(others):
-        raise RuntimeError("cvxpy has compiled the twin into a form that is not understood")
+        raise RuntimeError("cvxpy has compiled the twin into an unknown form")
     factor = splu(csc_matrix(left[np.ix_(rows, others)]))
     m, offset = -factor.solve(left[np.ix_(rows, ours)]), factor.solve(b[rows])
     reduced = a[:, ours] + a[:, others] @ m

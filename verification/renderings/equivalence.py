@@ -38,7 +38,7 @@ CLARABEL_OPTIONS = {  # cvxpy's, in its units: grams. Its default regularisation
     "iterative_refinement_abstol": 1e-14,
     "iterative_refinement_reltol": 1e-14,
 }
-C_TOLERANCE = 3e-8  # operator splitting: the last digits take as long as all before
+C_TOLERANCE = 3e-8  # operator splitting: the last digits take as long as all others
 C_RHO = 0.02  # to the last digit; measured: less takes longer in the worst case, more in the mean
 
 
@@ -60,7 +60,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Equivalence:
-    """Differences over many cases, a dictionary a case: by rendering."""
+    """Differences over many cases, one dictionary per case: by rendering."""
 
     cases: list[dict[str, Difference]]
 
@@ -82,15 +82,15 @@ class Equivalence:
 class Renderings:
     """The QP of one trip in its renderings: `cvxpy` and, with a C compiler, `c`.
 
-    All are made from one table of rows, so this holds the makers against each other; what the
-    table says is held against the equations by `independent.stage_program`. Each has a solver of
-    its own: cvxpy calls Clarabel on what it compiles, the generated C iterates to the end, and the
-    product's matrices go to PIQP.
+    All are made from one table of rows, so this compares the renderings with each other; the
+    table itself is compared with the equations by `independent.stage_program`. Each has its own
+    solver: cvxpy calls Clarabel on its compiled program, the generated C iterates to convergence,
+    and the product's matrices go to PIQP.
 
     Parameters
     ----------
-    trip : vehicle and road
-    settings : of all controllers; those of `mh_qp` count
+    trip : vehicle and cycle
+    settings : of all controllers; those of `mh_qp` apply
 
     Raises
     ------
@@ -115,7 +115,7 @@ class Renderings:
         self._is_set_up = False
 
     def inputs(self, case: QpCase) -> tuple[Stages, float, float, Linearisation]:
-        """Return what the renderings in Python are updated with."""
+        """Return the data for updating the renderings in Python."""
         seen = case.seen
         about = Linearisation.about(case.x, seen.t_cl_degc, self.preview.settings)
         return self.preview.at(seen.step), seen.soc, seen.t_cl_degc, about
@@ -151,7 +151,7 @@ class Renderings:
     def _by_cvxpy(self, case: QpCase, data: QpData) -> tuple[Matrices, Floats]:
         self.twin.update(*self.inputs(case), data.scaling)
         matrices = cvxpy_matrices(self.twin)
-        with warnings.catch_warnings(action="ignore"):  # how accurate it is, is measured
+        with warnings.catch_warnings(action="ignore"):  # its accuracy is measured
             try:
                 return matrices, self.twin.solve("CLARABEL", **CLARABEL_OPTIONS).ravel()
             except QpmpcError:
@@ -174,9 +174,9 @@ def check_equivalence(
 
     Parameters
     ----------
-    trip : where the cases come from
-    every : one recorded case each so many steps
-    random, seed : how many random cases, and their seed
+    trip : source of the cases
+    every : one recorded case per this many steps
+    random, seed : number of random cases, and their seed
     settings : of all controllers
 
     Raises

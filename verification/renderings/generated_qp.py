@@ -17,15 +17,15 @@ from qpmpc.verification.renderings.matrices import Matrices, matrices_from
 Floats = NDArray[np.float64]
 
 READ = ("mpc_admm.c", "mpc_step.c")
-UNBOUNDED = 1e29  # in solver units; the C code means 1e30
-SLICE, SLICES = 10_000, 300  # iterations between two looks at the residuals, and how often at most
+UNBOUNDED = 1e29  # in solver units; the C code uses 1e30
+SLICE, SLICES = 10_000, 300  # iterations between two checks of the residuals, and the most checks
 GAP = 100.0  # the gap falls later than the error in the cost, to which it is an upper bound
 
 
 class GeneratedQp:
     """The QP of one trip in the generated C, in double precision.
 
-    The library is that of this machine with a reader beside it, which asks the solver itself.
+    The library is that of this machine with a reader beside it, which calls the solver itself.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class GeneratedQp:
     def __init__(self, values: Values, inputs: InputBuilder) -> None:
         project = project_files(values, "host", "f64")
         folder = files("qpmpc.verification.renderings").joinpath("read_c")
-        for name in READ:  # appended, as it needs what the files keep to themselves
+        for name in READ:  # appended, as it needs static functions of the files
             project[name] += folder.joinpath(f"append_to_{name}").read_text("utf-8")
         file = compiled(project)
         self.library = HostLibrary(file, values, "f64")
@@ -54,7 +54,7 @@ class GeneratedQp:
         self._rows = values.sizes.stages, values.sizes.rows
 
     def update(self, seen: Observation, x: Floats) -> Matrices:
-        """Make the QP of what is seen, expanded about a plan.
+        """Make the QP of an observation, expanded about a plan.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""KKT residuals of a QP, recomputed from its data: no solver is asked."""
+"""KKT residuals of a QP, recomputed from its data without a solver."""
 
 from dataclasses import dataclass
 

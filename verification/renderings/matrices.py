@@ -1,4 +1,4 @@
-"""A QP as plain matrices in SI units, and how far two of them differ whatever their row order."""
+"""A QP as plain matrices in SI units, and the difference of two for any order of rows."""
 
 from dataclasses import dataclass
 

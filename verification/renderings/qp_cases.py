@@ -1,4 +1,4 @@
-"""What QPs are made from: states and plans met by `mh-qp` on the road, and random ones."""
+"""Inputs of QPs: states and plans from closed loops of `mh-qp`, and random ones."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ PLAN_T_CL_DEGC, PLAN_FUEL_G_PER_S, PLAN_P_ENG_W = (20.0, 90.0), (0.0, 3.0), (0.0
 
 @dataclass(frozen=True)
 class QpCase:
-    """What one QP is made from.
+    """The input of one QP.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class QpCase:
 
 
 def recorded_cases(trip: Trip, settings: ControllerSettings, every: int) -> Iterator[QpCase]:
-    """Cases met by `mh-qp` on the road: each `every`-th step, about the plan of the step before."""
+    """Cases of `mh-qp` in closed loop: each `every`-th step, about the previous step's plan."""
     kept: list[QpCase] = []
     before: QpPlan | None = None  # the last plan, when the QP of this second is solved
 
@@ -55,7 +55,7 @@ def recorded_cases(trip: Trip, settings: ControllerSettings, every: int) -> Iter
 
 
 def random_cases(trip: Trip, stages: int, count: int, seed: int) -> Iterator[QpCase]:
-    """Cases that no trip may ever meet: any step, any state, any plan to expand about."""
+    """Cases that may occur in no trip: any step, any state, any plan to expand about."""
     rng = np.random.default_rng(seed)
     battery = trip.vehicle.battery
     for _ in range(count):

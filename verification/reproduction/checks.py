@@ -1,4 +1,4 @@
-"""What must hold, and whether it does."""
+"""Requirements, and whether they hold."""
 
 from dataclasses import dataclass
 
@@ -26,9 +26,9 @@ class Check:
 
     Attributes
     ----------
-    name : what must hold
+    name : the requirement
     required, measured : in words and numbers
-    holds : whether it does
+    holds : whether it is met
     """
 
     name: str

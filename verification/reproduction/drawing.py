@@ -1,4 +1,4 @@
-"""What the pictures share: colours of the variants, time series with a sample a second."""
+"""Shared by the pictures: colours of the variants, time series with one sample per second."""
 
 from typing import Any
 
@@ -36,7 +36,7 @@ def panels(count: int, unit_in: float = 1.55, **keywords: Any) -> tuple[Figure, 
 
 
 def speed_panel(axes: Axes, run: Run) -> None:
-    """The road."""
+    """Speed and demand of the trip."""
     speed_kmh = 3.6 * run.trajectory.speed_mps
     time_s = np.arange(len(speed_kmh)) + 0.5
     axes.fill_between(time_s, speed_kmh, color="#cccccc", edgecolor=BLACK, linewidth=0.6)

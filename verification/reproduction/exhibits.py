@@ -53,7 +53,7 @@ class Table:
     ----------
     name : stem of its file
     columns, rows : titles with units, cells
-    digits : decimals of numbers, a column
+    digits : decimals of numbers, per column
     """
 
     name: str

@@ -12,7 +12,7 @@ from qpmpc.verification.reproduction.study import Study
 from qpmpc.verification.reproduction.tables import LABELS, printed_name
 from qpmpc.verification.reproduction.variants import OPTIMUM, OURS, PAPER_GRID, RULES, baseline
 
-# What public sources allow for k: EPA's cold tests, ADVISOR's law (MODEL of this plant).
+# Range of k by public sources: EPA's cold tests, ADVISOR's law (MODEL of this plant).
 K_RANGE = (0.15, 0.525)
 
 
@@ -53,20 +53,20 @@ def alpha_picture(study: Study) -> Picture:
 
 
 def horizon_fuel_picture(study: Study) -> Picture:
-    """Fuel of the baseline by horizon, and its time a step."""
+    """Fuel of the baseline by horizon, and its time per step."""
     labels = [*(baseline(horizon) for horizon in paper.HORIZONS_S), OPTIMUM]
     return _bars(
         study,
         labels,
         "fuel_horizon",
         "Fuel and time by horizon",
-        "Fuel of the baseline above dynamic programming, and its mean time a step; the paper's "
+        "Fuel of the baseline above dynamic programming, and its mean time per step; the paper's "
         f"times are its own solver's on an {paper.COMPUTER}.",
     )
 
 
 def fuel_picture(study: Study) -> Picture:
-    """Fuel of all controllers, savings and time a step."""
+    """Fuel of all controllers, savings and time per step."""
     return _bars(
         study,
         LABELS,
@@ -157,7 +157,7 @@ def _bars(study: Study, labels: list[str], name: str, title: str, caption: str) 
             tidy(axes)
             axes.tick_params(axis="x", labelsize=7)
     grid[0, 0].set_ylabel("balanced fuel, g (axis cut)")
-    grid[1, 0].set_ylabel("mean time a step, ms\n(crosses: the paper's)")
+    grid[1, 0].set_ylabel("mean time per step, ms\n(crosses: the paper's)")
     figure.suptitle(f"{title}; in brackets the paper's saving", fontsize=11)
     return Picture(name, title, caption, figure, data)
 
@@ -188,12 +188,12 @@ def robustness_picture(study: Study) -> Picture:
         axes.set_title(f"{cycle}: {bad} of {len(runs)} violate a limit", fontsize=9)
         axes.set_xlabel("loss of fuel, %")
         tidy(axes)
-    figure.suptitle(f"{OURS} with wrong forecasts: loss to its perfect-forecast self", fontsize=11)
+    figure.suptitle(f"{OURS} with wrong forecasts: loss against the true forecast", fontsize=11)
     return Picture(
         "robustness",
         "Wrong forecasts",
-        "A dot is a trip, a bar the mean of its kind. Below zero: the wrong forecast happened to "
-        "be lucky, because the plan's model is not the plant.",
+        "A dot is a trip, a bar the mean of its kind. Below zero the wrong forecast happened to "
+        "save fuel, because the plan's model is not the plant.",
         figure,
         {
             key: [getattr(run, key) for run in study.forecasts]

@@ -1,4 +1,4 @@
-"""What the numbers say, in sentences made from them: agreement, disagreement, causes."""
+"""Findings as sentences made from the numbers: agreement, disagreement, causes."""
 
 from qpmpc.verification.reproduction import paper
 from qpmpc.verification.reproduction.checks import CAUSAL, Check, order_of
@@ -32,7 +32,7 @@ def findings(study: Study, checks: list[Check]) -> list[tuple[str, list[str]]]:
             "What agrees with the paper",
             _order(study, agreeing=True) + _savings(study, True) + _thermal(study),
         ),
-        ("What does not", _order(study, agreeing=False) + _savings(study, False) + _failed(checks)),
+        ("What differs", _order(study, agreeing=False) + _savings(study, False) + _failed(checks)),
         ("Why", _causes(study)),
     ]
 
@@ -88,8 +88,9 @@ def _thermal(study: Study) -> list[str]:
         rules = thermal_story(study.runs[cycle.name, RULES])
         if best.released_mj > 0.0 and best.off_share_last > rules.off_share_last:
             text.append(
-                f"{cycle.name}: the coolant is used as a store. DP lets {best.released_mj:.2f} MJ "
-                f"go between its hottest moment ({best.peak_s} s) and arrival, {OURS} "
+                f"{cycle.name}: the coolant is used as a store. DP releases "
+                f"{best.released_mj:.2f} MJ between its hottest moment ({best.peak_s} s) and "
+                f"arrival, {OURS} "
                 f"{ours.released_mj:.2f} MJ, the rules {rules.released_mj:.2f} MJ; in the last "
                 f"third of the trip the engine is off {100 * best.off_share_last:.0f} % (DP), "
                 f"{100 * ours.off_share_last:.0f} % ({OURS}) and "
@@ -118,7 +119,7 @@ def _causes(study: Study) -> list[str]:
         "The plant is not the paper's: its structure and limits are, but its road load, engine "
         "map, battery and cold multiplier come from public sources, because the paper's own data "
         "are not published. Percentages and shapes can be compared, grams cannot.",
-        "The rules are not the paper's either: it does not print their thresholds.",
+        "The rules are not the paper's either: the paper does not give their thresholds.",
     ]
     for cycle in study.extent.cycles:
         text += _rules_range(study, cycle.name)
@@ -147,7 +148,7 @@ def _rules_range(study: Study, cycle: str) -> list[str]:
 
 
 def _heat_request(study: Study, cycle: str) -> list[str]:
-    """How much of the saving is the rules' heat request alone."""
+    """The part of the saving that is due to the rules' heat request alone."""
     late_g = study.experiments[cycle, LATE_HEAT]["fuel_soc_balanced_g"]
     best_g = study.rows[cycle, OPTIMUM]["fuel_soc_balanced_g"]
     saving = study.rows[cycle, OPTIMUM]["saving_vs_rule_percent"]
@@ -168,14 +169,14 @@ def _averaging(study: Study, cycle: str) -> list[str]:
     )
     sentence = (
         f"{cycle}: on the paper's grid, where a block of 20 s has its mean demand, the controller "
-        f"ends {mean:+.2f} % from DP. With three demand classes a block and nothing else changed "
+        f"ends {mean:+.2f} % from DP. With three demand classes per block and nothing else changed "
         f"it is {classes:+.2f} %, with blocks of 5 s {finer:+.2f} %, and with 1000 iterations "
         f"instead of the fixed ones {exact:+.2f} %"
     )
     better = min(classes, finer) < mean - 0.1
     if better and exact > min(classes, finer) + 0.1:
         sentence += (
-            ": it is the mean that costs. Averaging makes stop and go look like a gentle cruise "
+            ": the mean causes the loss. Averaging makes stop and go look like a gentle cruise "
             "that the battery could follow almost without loss."
         )
     else:
@@ -192,7 +193,7 @@ def _iterations(study: Study, cycle: str) -> list[str]:
         parts.append(f"H={horizon_s}: {fixed:+.2f} % and {many:+.2f} %")
     return [
         f"{cycle}: the baseline's distance from DP with fixed and with 1000 iterations is "
-        f"{'; '.join(parts)}: it comes from what the horizon does not see, not from the solver."
+        f"{'; '.join(parts)}: it comes from the short horizon, not from the solver."
     ]
 
 
@@ -206,6 +207,6 @@ def _flattered(study: Study, cycle: str) -> list[str]:
         return []
     return [
         f"{cycle}: the adaptive ECMS, without any preview, is at {ecms:+.2f} %, nearer than the "
-        f"best baseline ({best}). Its equivalence factor was tuned on these very cycles; what a "
-        "short horizon sees is worth less than a good price of charge."
+        f"best baseline ({best}). Its equivalence factor was tuned on these very cycles; a short "
+        "preview is worth less than a good price of charge."
     ]

@@ -1,4 +1,4 @@
-"""What the paper prints, as a source of comparison; nothing here enters a computation.
+"""The paper's printed figures, for comparison only; nothing here enters a computation.
 
 Q. Hu, M. R. Amini, H. Wang, I. Kolmanovsky, J. Sun, "Integrated Power and Thermal Management of
 Connected HEVs via Multi-Horizon MPC", American Control Conference 2020. Savings are over its
@@ -16,7 +16,7 @@ SAVING_PERCENT: dict[tuple[str, str], float] = {
     ("nedc-truncated", "baseline H=20"): 1.37,
     ("nedc-truncated", "baseline H=100"): 1.84,
 }
-# The text says "up to" for NYCC and does not say at which horizon.
+# The text has "up to" for NYCC and does not give the horizon.
 BASELINE_BEST_NYCC_PERCENT = 15.3
 
 STEP_TIME_S: dict[str, float] = {"baseline H=20": 0.46, "baseline H=100": 2.12, "mh": 0.67}

@@ -1,4 +1,4 @@
-"""Everything that is run: closed loops, dynamic programming, experiments, wrong forecasts."""
+"""All runs: closed loops, dynamic programming, experiments, wrong forecasts."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -38,12 +38,12 @@ class Jobs(Protocol):
     """A progress bar over jobs."""
 
     def next_job(self, title: str) -> Report:
-        """Start a job; returns what it calls as report(done, in all)."""
+        """Start a job; returns the function to call as report(done, in all)."""
 
 
 @dataclass(frozen=True)
 class Snapshot:
-    """The plan of one step, with the road as it really is.
+    """The plan of one step, with the true trip.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Study:
 
     Attributes
     ----------
-    vehicle, settings, extent : what was run
+    vehicle, settings, extent : of the runs
     runs : by (cycle, label)
     rows : their figures, with savings and distances from dynamic programming
     optima : dynamic programming by cycle
@@ -89,7 +89,7 @@ class Study:
 
         m - lambda (SOC_end - SOC_init) - m_dp, with lambda the costate of the final SOC: the
         least fuel is convex in the final SOC, so this is a lower bound of the distance from the
-        optimum that ends where the run ended. Fixed efficiencies are no such bound.
+        optimum that ends where the run ended. Fixed efficiencies do not give such a bound.
         """
         run, best = self.runs[cycle, label], self.optima[cycle]
         surplus = float(run.trajectory.soc[-1]) - float(best.soc[-1])
@@ -103,13 +103,13 @@ def job_count(extent: Extent) -> int:
 
 
 def run_study(vehicle: Vehicle, settings: ControllerSettings, extent: Extent, jobs: Jobs) -> Study:
-    """Run everything; one closed loop after the other, so that step times are not disturbed.
+    """Run everything; one closed loop after the other, so that step times are not affected.
 
     Parameters
     ----------
     vehicle, settings : user's overrides included
     extent : which cycles, how many forecasts
-    jobs : told of each job; there are `job_count(extent)`
+    jobs : notified of each job; there are `job_count(extent)`
     """
     if extent.dp is not None:
         settings = settings.with_section("dp", extent.dp)

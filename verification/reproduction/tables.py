@@ -43,7 +43,7 @@ def fuel_table(study: Study) -> Table:
             )
     return Table(
         "table_fuel",
-        "Fuel, savings and time a step",
+        "Fuel, savings and time per step",
         "Balanced fuel counts the final SOC's difference at trip.eta_eq. The paper's distance from "
         f"DP follows from its savings; its times are from an {paper.COMPUTER}. It prints the "
         f"baseline on NYCC as up to {paper.BASELINE_BEST_NYCC_PERCENT} % only.",
@@ -57,8 +57,8 @@ def fuel_table(study: Study) -> Table:
             "paper: above DP, %",
             "final SOC",
             "engine starts",
-            "mean time a step, ms",
-            "paper: time a step, ms",
+            "mean time per step, ms",
+            "paper: time per step, ms",
         ),
         rows,
         (0, 0, 1, 2, 2, 2, 2, 3, 0, 3, 0),
@@ -129,8 +129,8 @@ def experiments_table(study: Study) -> Table:
     return Table(
         "table_experiments",
         "Causes, by experiment",
-        "What the mean demand of a block hides, what the fixed number of iterations costs, and how "
-        "far the rules' thresholds move every saving. Each line changes one thing.",
+        "Effects of the mean demand of a block, of the fixed number of iterations, and of the "
+        "rules' thresholds on every saving. Each line changes one thing.",
         (
             "cycle",
             "experiment",
@@ -233,7 +233,7 @@ def checks_table(study: Study) -> Table:
     rows: list[list[Cell]] = [list(astuple(check)) for check in checks_of(study)]
     return Table(
         "table_checks",
-        "What must hold, and whether it does",
+        "Requirements and whether they hold",
         "The requirements were set for the default car and its winter day; with other parameters "
         "they are shown all the same.",
         ("requirement", "required", "measured", "holds"),

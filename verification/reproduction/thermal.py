@@ -1,4 +1,4 @@
-"""The coolant as a store: what is put in, what is taken out, and when."""
+"""The coolant as a store: heat put in and taken out, and when."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ class ThermalStory:
     Attributes
     ----------
     stored_mj : C (T_peak - T_start)
-    released_mj : C (T_peak - T_end), what the engine-off driving lived on
+    released_mj : C (T_peak - T_end), heat used while driving with the engine off
     peak_s : time of the highest coolant temperature
     soc_peak_s : time of the highest SOC
     off_share : share of the whole trip with the engine off

@@ -53,8 +53,8 @@ def horizon_picture(study: Study) -> Picture:
     longest = max(len(study.runs[cycle, OPTIMUM].trajectory.soc) for cycle in cycles)
     return Picture(
         "soc_horizon",
-        "SOC: how far the horizon sees",
-        "A longer horizon moves the SOC more like dynamic programming does.",
+        "SOC by length of the horizon",
+        "With a longer horizon the SOC moves more as in dynamic programming.",
         finish(figure, axes, "SOC of the baseline for H = 20 and 100 s, and of DP", axes[0]),
         {"time_s": range(longest), **data},  # type: ignore[dict-item]
     )
@@ -82,7 +82,7 @@ def all_picture(study: Study, cycle: str) -> Picture:
 
 
 def thermal_picture(study: Study, cycle: str) -> Picture:
-    """What charge and heat are worth to the optimum, and what it does with them."""
+    """Worth of charge and heat to the optimum, and their use in it."""
     best, run = study.optima[cycle], study.runs[cycle, OPTIMUM]
     figure, axes = panels(5)
     speed, engine, soc, coolant, worth = axes
@@ -107,9 +107,9 @@ def thermal_picture(study: Study, cycle: str) -> Picture:
     return Picture(
         f"thermal_{cycle}",
         f"The coolant as a store: dynamic programming on {cycle}",
-        "The costates say what fuel a kelvin of coolant and a hundredth of SOC save later. Heat is "
-        "worth least where the trip no longer needs it: a warm engine at arrival is waste.",
-        finish(figure, axes, f"{cycle}: what heat and charge are worth", coolant),
+        "The costates are the fuel that a kelvin of coolant and a hundredth of SOC save later. "
+        "Heat is worth least where the trip no longer needs it: a warm engine at arrival is waste.",
+        finish(figure, axes, f"{cycle}: worth of heat and charge", coolant),
         {
             "time_s": range(len(best.soc)),
             "soc": best.soc.tolist(),
@@ -175,9 +175,9 @@ def concept_picture(study: Study) -> Picture:
     return Picture(
         "multi_horizon",
         "Two horizons in one problem",
-        "Seconds first, then blocks to the trip's end. The paper's grid has a mean a block; ours "
-        "has up to three stages a block, hard driving, easy driving and braking, each with its own "
-        "duration: where in the block they happen is not known and does not matter.",
-        finish(figure, axes, f"{name}: what the QP sees at one step"),
+        "Seconds first, then blocks to the trip's end. The paper's grid has one mean per block; "
+        "ours has up to three stages per block, hard driving, easy driving and braking, each with "
+        "its own duration: their places in the block are not known and do not matter.",
+        finish(figure, axes, f"{name}: horizon of the QP at one step"),
         data,  # type: ignore[arg-type]
     )

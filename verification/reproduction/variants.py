@@ -1,4 +1,4 @@
-"""What drives: the paper's controllers and ours, and the extent of a reproduction."""
+"""The controllers compared, the paper's and ours, and the extent of a reproduction."""
 
 from dataclasses import dataclass, field
 
@@ -9,11 +9,11 @@ from qpmpc.verification.reproduction import paper
 
 @dataclass(frozen=True)
 class Variant:
-    """A controller with settings of its own.
+    """A controller with its own settings.
 
     Attributes
     ----------
-    label : under which it is reported
+    label : its name in reports
     controller : its name
     settings : dotted settings on top of the user's
     """
@@ -45,10 +45,10 @@ VARIANTS = (
 
 LATE_HEAT = "rules, heat request 42/44 °C"
 
-# Each asks one question about a distance from dynamic programming or a saving.
+# Each tests one cause of a distance from dynamic programming or a saving.
 EXPERIMENTS = (
     Variant(
-        "paper's grid, 3 demand classes a block",
+        "paper's grid, 3 demand classes per block",
         PAPER_GRID,
         {"mh_qp_paper.horizon.classes": 3},
     ),
@@ -85,7 +85,7 @@ EXPERIMENTS = (
 
 @dataclass(frozen=True)
 class Extent:
-    """How much is run.
+    """Extent of a reproduction.
 
     Attributes
     ----------

@@ -11,7 +11,7 @@ SHOWN_PERCENT = 3.0  # larger values are drawn at the edge, with their number
 
 
 def draw_study(rows: Sequence[dict[str, Any]]) -> bytes:
-    """Return a PNG: a line a variant, mean as a dot, maximum as the end of its bar."""
+    """Return a PNG: one line per variant, mean as a dot, maximum as the end of its bar."""
     figure = Figure(figsize=(7.5, 0.24 * len(rows) + 1.2), layout="constrained")
     axes = figure.subplots()
     default = rows[0]["mean_percent"]

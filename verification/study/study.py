@@ -24,7 +24,7 @@ class Place:
 
     @property
     def label(self) -> str:
-        """Name as it stands in tables."""
+        """Name in tables."""
         return f"{self.cycle.name}, {self.vehicle.name}, {self.vehicle.thermal.t_amb_degc:g} C"
 
 
@@ -42,8 +42,8 @@ def judge(variant: Variant, where: Sequence[Place]) -> dict[str, Any]:
 
     Returns
     -------
-    fuel above DP in percent a place, its mean and maximum, the places where a limit was violated,
-    and the median step time over all places
+    fuel above DP in percent for each place, its mean and maximum, the places where a limit was
+    violated, and the median step time over all places
     """
     overrides = {f"mh_qp.{key}": value for key, value in variant.overrides.items()}
     settings = ControllerSettings().with_settings(overrides)

@@ -44,7 +44,7 @@ def variants() -> tuple[Variant, ...]:
     ]
     found += _one("fuel PWA, g/s", "pwa.fuel_g_per_s", 0.0005, 0.005, 0.02)
     found += _one("alpha PWA", "pwa.alpha", 0.0002, 0.005)
-    found.append(Variant("departure", "on the road", {"prepared": False}))
+    found.append(Variant("departure", "under way", {"prepared": False}))
     return tuple(found)
 
 

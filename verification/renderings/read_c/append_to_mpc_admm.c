@@ -1,9 +1,9 @@
 
 /* For verification only, never part of a generated controller: reads the quadratic program out of
- * its memory. It asks the functions that solve it, for the matrix by multiplying unit vectors and
- * for the bounds by clipping what lies far beyond them, so that what it finds is what is solved.
+ * its memory. It calls the functions that solve it: for the matrix it multiplies unit vectors, for
+ * the bounds it clips values far beyond them, and so recovers the program that is solved.
  */
-#define FAR REAL(1.0e36) /* far beyond what stands for no bound */
+#define FAR REAL(1.0e36) /* far beyond the value that means no bound */
 
 /* Entries of the matrix, (stages, rows, variables): for the stage itself and the one before. */
 void reader_matrix(const mpc_state *state, mpc_real *here, mpc_real *before)
@@ -25,7 +25,7 @@ void reader_matrix(const mpc_state *state, mpc_real *here, mpc_real *before)
     }
 }
 
-/* Where the duals of all rows of a stage would leave its products with the matrix. */
+/* Values of all rows of a stage after clipping with this dual. */
 static void reader_clip(const mpc_stage *stage, mpc_real dual, mpc_real *bound)
 {
     mpc_stage probe = *stage;
