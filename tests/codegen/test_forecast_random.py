@@ -5,9 +5,9 @@ import subprocess
 
 import pytest
 
-from qpmpc.codegen import generate, values_of
-from qpmpc.codegen.generate import PRECISIONS
-from qpmpc.controllers.factory import ControllerSettings
+from qpmpc.codegen.generate import PRECISIONS, generate
+from qpmpc.codegen.values import values_of
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.vehicle import load_vehicle
 
 # Arrays of exactly the size that is declared, so that reading beyond them is noticed; seconds
@@ -76,7 +76,7 @@ int main(void)
 def test_random_trips_and_seconds_under_sanitizers(tmp_path, precision) -> None:
     if shutil.which("gcc") is None:
         pytest.skip("not installed: gcc")
-    few = ControllerSettings().with_settings({"mh_qp.osqp.iterations": 2})
+    few = ControllerSettings().with_settings({"mh_qp.admm.iterations": 2})
     generate(values_of(load_vehicle(), few.mh_qp, few.rule_based), tmp_path, "host", precision)
     (tmp_path / "random.c").write_text(RANDOM_C)
     checks = "address,undefined,float-cast-overflow,float-divide-by-zero"
