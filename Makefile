@@ -32,7 +32,7 @@ types: $(STAMP)
 	cd $(TYPED) && ../../$(BIN)/mypy --config-file ../../pyproject.toml --cache-dir ../../.mypy_cache -p qpmpc
 
 docs: $(STAMP)
-	$(BIN)/pdoc qpmpc --docformat numpy --output-directory build/api
+	$(BIN)/python docs/make_api.py build/api
 
 venv: $(STAMP)
 

@@ -14,7 +14,7 @@ from qpmpc.controllers.receding_horizon import Planner
 from qpmpc.controllers.settings import ControllerSettings, SettingsLike
 from qpmpc.cycles import Cycle
 from qpmpc.errors import InputError
-from qpmpc.files import json_text, write_text
+from qpmpc.files import check_file, json_text, write_text
 from qpmpc.registry import ControllerLike, check_controllers, make_controller
 from qpmpc.report.columns import COMPARE_COLUMNS, notes
 from qpmpc.report.table import print_rows
@@ -70,17 +70,19 @@ class Runs(Sequence[Run]):
         Raises
         ------
         InputError
-            If there is no run, or matplotlib is not installed.
+            If there is no run, matplotlib is not installed, or the file cannot be written.
         """
         if not self._runs:
             raise InputError("there is no run to report")
         path = Path(file)
+        check_file(path, "report")
         write_text(path, comparison_html(self._runs, self.rows(), self.settings))
         return path
 
     def to_json(self, file: str | os.PathLike[str]) -> Path:
         """Write the figures as ``{"runs": [...]}``."""
         path = Path(file)
+        check_file(path, "JSON file")
         write_text(path, json_text({"runs": self.rows()}))
         return path
 

@@ -6,6 +6,7 @@ see `Names`; ``docs/extending.md`` shows how.
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
+from difflib import get_close_matches
 
 from qpmpc.controllers.base import Controller
 from qpmpc.controllers.receding_horizon import Planner, RecedingHorizon
@@ -195,11 +196,16 @@ def check_sections(
         elif section in named:
             model = _table_of(named[section]).settings_model(named[section])
         else:
-            known = {*ControllerSettings.sections(), "dp", *own, *Vehicle.model_fields} - _SCALARS
+            added = [_section(name) for name in (*CONTROLLERS.added, *PLANNERS.added)]
+            known = sorted(
+                {*ControllerSettings.sections(), "dp", *own, *added, *Vehicle.model_fields}
+                - _SCALARS
+            )
             key = ".".join([section, *list(values)[:1]])
+            near = get_close_matches(_section(section), known, n=1)
+            hint = f", did you mean {near[0]!r}?" if near else ":"
             raise InputError(
-                f"no parameter {key!r}: names start with one of {', '.join(sorted(known))} "
-                "and a dot"
+                f"no parameter {key!r}{hint} names start with one of {', '.join(known)} and a dot"
             )
         if model is None:
             raise InputError(f"controller {section.replace('_', '-')!r} has no settings of its own")

@@ -14,7 +14,17 @@ from qpmpc.vehicle import DEFAULT_VEHICLE, Plant, PlantState, Vehicle, load_vehi
 
 
 class Observation(NamedTuple):
-    """Measurements at the start of a step; demand and speed are those of the coming second."""
+    """Measurements at the start of a step; demand and speed are those of the coming second.
+
+    Attributes
+    ----------
+    step : number of the step, 0 at departure; steps take 1 s
+    soc : state of charge, 0..1
+    t_cl_degc : coolant temperature
+    engine_on : whether the engine ran in the last step
+    demand_w : power demand at the electrical side, negative when braking
+    speed_mps : mean speed
+    """
 
     step: int
     soc: float

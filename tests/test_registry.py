@@ -148,6 +148,8 @@ def test_a_package_adds_controllers_vehicles_and_cycles(installed: dict[str, str
     assert [row["controller"] for row in runs] == names.split(",")
     assert {row["vehicle"] for row in runs} == {"sample-car"}
     assert {row["cycle"] for row in runs} == {"sample-hill"}
+    for command, name in (("cycles", "sample-hill"), ("vehicles", "sample-car")):
+        assert name in run(installed, command).stdout
     threshold, steady = runs[:2]
     assert 0.0 < threshold["engine_on_share"] < 1.0
     assert steady["fallback_steps"] == 0
@@ -192,6 +194,7 @@ def test_a_package_adds_a_check(installed: dict[str, str]) -> None:
         (["--controller", "sample-broken"], "of sample-qpmpc cannot be loaded"),
         (["--controller", "sample-thresold"], "did you mean 'sample-threshold'?"),
         (["--set", "sample_threshold.nonsense=1"], "nonsense"),
+        (["--set", "sample-threshold.on_w=1"], "did you mean 'sample_threshold'?"),
     ],
 )
 def test_what_goes_wrong_in_a_package_is_one_line(

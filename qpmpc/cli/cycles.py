@@ -36,6 +36,7 @@ def cycles(
     from qpmpc.cli.console import result_console
     from qpmpc.cli.inputs import check_outputs
     from qpmpc.cycles import catalogue, load_cycle
+    from qpmpc.cycles.load import CYCLES
     from qpmpc.errors import InputError
     from qpmpc.report.write import write_cycle
 
@@ -45,7 +46,7 @@ def cycles(
     console = result_console()
     entries = {entry.name: entry for entry in catalogue()}
     if name is None:
-        _list(console, [(load_cycle(entry.name), entry) for entry in catalogue()])
+        _list(console, [(load_cycle(known), entries.get(known)) for known in CYCLES.names()])
         return
     cycle = load_cycle(name)
     entry = entries.get(name)

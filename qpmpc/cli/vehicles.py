@@ -44,7 +44,8 @@ def vehicles(
     from qpmpc.errors import InputError
     from qpmpc.report.pwa_curves import pwa_curves
     from qpmpc.report.write import write_pwa
-    from qpmpc.vehicle import load_vehicle, vehicle_file_text, vehicle_names
+    from qpmpc.vehicle import load_vehicle, vehicle_file_text
+    from qpmpc.vehicle.names import VEHICLES
 
     if toml:
         if name is None or out is not None:
@@ -62,8 +63,8 @@ def vehicles(
     check_outputs(None, out)
     console = result_console()
     if name is None:
-        for shipped in vehicle_names():
-            console.print(f"{shipped}: {load_vehicle(shipped).description}", markup=False)
+        for known in VEHICLES.names():
+            console.print(f"{known}: {load_vehicle(known).description}", markup=False)
         return
     vehicle = load_vehicle(name)
     curves = pwa_curves(vehicle)

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 # Okabe and Ito, "Color Universal Design" (2008): safe with all common colour deficiencies.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
-BLUE, VERMILION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
+BLUE, VERMILION, PURPLE, YELLOW = "#0072B2", "#D55E00", "#CC79A7", "#C9B800"  # darkened
 GREY = "#777777"
 
 # A controller has the same colour and dashes in every picture; others take the spare ones.
@@ -21,7 +21,7 @@ CONTROLLER_STYLES = {
     "ecms": (ORANGE, "-"),
     "mh-nlp": (PURPLE, (0, (4, 2))),
 }
-SPARE_STYLES = ((BLUE, "-"), (BLUE, (0, (1, 1))))
+SPARE_STYLES = ((BLUE, "-"), (YELLOW, "-"), (BLUE, (0, (1, 1))), (YELLOW, (0, (1, 1))))
 LIMIT: dict[str, Any] = {"color": "#AA0000", "linewidth": 0.8, "linestyle": (0, (1, 2))}
 
 DPI = 110

@@ -20,7 +20,13 @@ class PlantState(NamedTuple):
 
 
 class Command(NamedTuple):
-    """A controller's command to the engine for one step."""
+    """A controller's command to the engine for one step.
+
+    Attributes
+    ----------
+    engine_on : whether the engine runs
+    p_eng_w : its power, 0 with the engine off
+    """
 
     engine_on: bool
     p_eng_w: float
