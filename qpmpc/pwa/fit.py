@@ -105,6 +105,8 @@ def _tangent_pieces(
         at = float(x[j - 1] + inside / (inside - surplus[j]) * (x[j] - x[j - 1]))
         value = value + slope * (at - starts[-1])
         i = int(np.searchsorted(x, at, side="right")) - 1
+        if i == len(x) - 1:  # only round-off at the last sample was outside
+            return slopes, intercepts, starts
 
 
 def fit_convex(
