@@ -21,4 +21,4 @@ rows = ["demand_w,speed_mps,soc,t_cl_degc", *(",".join(map(repr, map(float, s)))
 made = subprocess.run(["./example", "trip.csv"], cwd=project, check=True, capture_output=True)
 commands = [line.split(",") for line in made.stdout.decode().splitlines()[1:]]
 worst_w = max(abs(float(c[2]) - p) for c, p in zip(commands, drove.p_eng_w, strict=True))
-print(f"{len(commands)} seconds decided in C; engine power differs by at most {1e3 * worst_w:.1f} mW")
+print(f"{len(commands)} s decided in C; engine power differs by at most {1e3 * worst_w:.1f} mW")
