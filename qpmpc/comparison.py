@@ -131,15 +131,20 @@ def compare(
             raise InputError(f"cycle {trip.cycle.name!r} is named twice")
         trips.append(trip)
     _one_vehicle([trip.vehicle for trip in trips])
-    # before any run, so that wrong settings are refused in time
+    # before any run, so that what cannot run is refused in time
     of_first = [make_controller(what, trip, chosen) for trip in trips[:1] for what in wanted]
-    remark_idle_settings(of_first, settings, wanted)
+    made_already = [what for what in wanted if isinstance(what, Controller | Planner)]
+    if len(trips) > 1 and made_already:
+        raise InputError(
+            f"controller {made_already[0].name!r} is made for one trip: give its class"
+        )
     runs = []
     for trip in trips:  # one after the other, so that step times are not affected
         for i, what in enumerate(wanted):
             name = what if isinstance(what, str) else what.name
             report = next_job(f"{trip.cycle.name}, {name}") if next_job is not None else None
             made = of_first[i] if trip is trips[0] else make_controller(what, trip, chosen)
+            remark_idle_settings(made, settings, wanted)
             runs.append(drive(trip, made, progress=report))
     return Runs(runs, chosen)
 

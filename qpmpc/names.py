@@ -39,26 +39,41 @@ class Names:
         [project.entry-points."qpmpc.controllers"]
         my-controller = "my_package.my_module:MyController"
 
-    A shipped name cannot be replaced.
+    A shipped name cannot be replaced; of two packages that add the same, the first by target is
+    used. Both are said.
 
     Parameters
     ----------
     kind : the kind, in the singular
     shipped : the names of this package, the default first
     also : other allowed inputs, for the error message
+    beside : shipped names of another kind, among which a user chooses as well
     """
 
-    def __init__(self, kind: str, shipped: Mapping[str, Shipped], also: str = "") -> None:
+    def __init__(
+        self,
+        kind: str,
+        shipped: Mapping[str, Shipped],
+        also: str = "",
+        beside: Mapping[str, Shipped] | None = None,
+    ) -> None:
         self.kind, self.shipped, self._also = kind, shipped, also
+        self._taken = {*shipped, *(beside or {})}
 
     @cached_property
     def added(self) -> dict[str, EntryPoint]:
         """Entry points of other packages by name."""
         found = sorted(entry_points(group=f"qpmpc.{self.kind}s"), key=lambda point: point.value)
+        added: dict[str, EntryPoint] = {}
         for point in found:
-            if point.name in self.shipped:
+            if point.name in self._taken:
                 say_once(f"{self.kind} {point.name!r} of {point.value} is not used: a shipped name")
-        return {point.name: point for point in found if point.name not in self.shipped}
+            elif point.name in added:
+                used = added[point.name].value
+                say_once(f"{self.kind} {point.name!r} of {point.value} is not used: {used} is")
+            else:
+                added[point.name] = point
+        return added
 
     def names(self) -> tuple[str, ...]:
         """Return all names, the default first."""

@@ -20,28 +20,24 @@ from qpmpc.vehicle.names import VEHICLES
 from qpmpc.vehicle.parameters import Vehicle
 
 # Called with trip and settings, each makes a controller, or a planner, of this trip.
-CONTROLLERS = Names(
-    "controller",
-    {
-        "mh-qp": Shipped("qpmpc.codegen.implementation:mh_qp"),
-        "mh-qp-paper": Shipped("qpmpc.codegen.implementation:mh_qp_paper"),
-        "rule-based": Shipped("qpmpc.controllers.balance:rule_based"),
-        "ecms": Shipped("qpmpc.controllers.ecms:Ecms"),
-        "dp": Shipped(
-            "qpmpc.verification.dynamic_programming.controller:Dp",
-            "numba",
-            "verification",
-            "qpmpc.verification.dynamic_programming.settings:DpSettings",
-        ),
-    },
-)
-PLANNERS = Names(
-    "planner",
-    {
-        "baseline-mpc": Shipped("qpmpc.controllers.baseline_mpc:baseline_mpc"),
-        "mh-nlp": Shipped("qpmpc.verification.nonlinear.mh_nlp:MhNlp", "casadi", "verification"),
-    },
-)
+_CONTROLLERS = {
+    "mh-qp": Shipped("qpmpc.codegen.implementation:mh_qp"),
+    "mh-qp-paper": Shipped("qpmpc.codegen.implementation:mh_qp_paper"),
+    "rule-based": Shipped("qpmpc.controllers.balance:rule_based"),
+    "ecms": Shipped("qpmpc.controllers.ecms:Ecms"),
+    "dp": Shipped(
+        "qpmpc.verification.dynamic_programming.controller:Dp",
+        "numba",
+        "verification",
+        "qpmpc.verification.dynamic_programming.settings:DpSettings",
+    ),
+}
+_PLANNERS = {
+    "baseline-mpc": Shipped("qpmpc.controllers.baseline_mpc:baseline_mpc"),
+    "mh-nlp": Shipped("qpmpc.verification.nonlinear.mh_nlp:MhNlp", "casadi", "verification"),
+}
+CONTROLLERS = Names("controller", _CONTROLLERS, beside=_PLANNERS)
+PLANNERS = Names("planner", _PLANNERS, beside=_CONTROLLERS)
 # Each leads to a `Group` of the checks of ``qpmpc verify``, in the order of its report.
 CHECKS = Names(
     "check",
@@ -78,12 +74,17 @@ def check_controllers(controllers: Sequence[ControllerLike]) -> None:
     Raises
     ------
     InputError
-        If a name is unknown or given twice, a class of somebody else's has a shipped name, or a
-        package that a controller needs is not installed.
+        If one is neither name nor class nor controller, a name is unknown or given twice, a class
+        of somebody else's has a shipped name, or a package that one needs is not installed.
     """
     shipped = {*CONTROLLERS.shipped, *PLANNERS.shipped}
     names: list[str] = []
     for what in controllers:
+        if not (isinstance(what, str | Controller | Planner) or _can_be_made(what)):
+            raise InputError(
+                f"controller {what!r} is no name, no class of controllers or planners that can be "
+                "made of a trip and settings, and none that is made"
+            )
         name = what if isinstance(what, str) else getattr(what, "name", repr(what))
         if isinstance(what, str):
             _table_of(name).check(name)
@@ -92,6 +93,11 @@ def check_controllers(controllers: Sequence[ControllerLike]) -> None:
         if name in names:
             raise InputError(f"controller {name!r} is named twice")
         names.append(name)
+
+
+def _can_be_made(what: object) -> bool:
+    kinds = Controller | Planner
+    return isinstance(what, type) and issubclass(what, kinds) and what is not RecedingHorizon
 
 
 def _kind(what: object) -> type:
@@ -112,6 +118,8 @@ def make_controller(
     ------
     InputError
         If a name is unknown, a package is missing, or a setting does not fit.
+    QpmpcError
+        If one that is made already belongs to another trip or has driven.
     """
     made: object = what
     if isinstance(what, str):
@@ -128,7 +136,8 @@ def make_controller(
             f"controller {what!r} leads to one with the name {made.name!r}: the two must be equal"
         )
     if isinstance(made, Planner):
-        return RecedingHorizon(trip, made, None if made is what else settings)
+        made = RecedingHorizon(trip, made, None if made is what else settings)
+    made.check_ready(trip)
     return made
 
 
@@ -136,6 +145,9 @@ def _called(
     maker: Callable[..., object], name: str, trip: Trip, settings: ControllerSettings | None
 ) -> object:
     """Call what makes a controller, if it can be called so."""
+    missing = sorted(getattr(maker, "__abstractmethods__", ()))
+    if missing:
+        raise InputError(f"controller {name!r} lacks {', '.join(missing)}")
     try:
         inspect.signature(maker).bind(trip, settings)
     except TypeError as error:

@@ -58,7 +58,7 @@ def simulate(
     check_controllers([controller])
     trip, chosen = prepared(as_trip(cycle, vehicle, forecast), settings, [controller])
     made = make_controller(controller, trip, chosen)
-    remark_idle_settings([made], settings, [controller])
+    remark_idle_settings(made, settings, [controller])
     return drive(trip, made, on_step=on_step, progress=progress)
 
 
@@ -85,17 +85,15 @@ def prepared(
             "make it, and its trip, with them"
         )
     if of_vehicle:
-        forecast = None if trip.forecast is trip.truth else trip.forecast
-        trip = Trip(trip.cycle, trip.vehicle.with_settings(of_vehicle), forecast)
+        trip = trip.with_vehicle(trip.vehicle.with_settings(of_vehicle))
     return trip, chosen
 
 
 def remark_idle_settings(
-    made: Sequence[Controller], settings: SettingsLike | None, controllers: Sequence[ControllerLike]
+    made: Controller, settings: SettingsLike | None, controllers: Sequence[ControllerLike]
 ) -> None:
-    """Say which settings, if any, reach none of the controllers, here and in their runs."""
+    """Say which settings, if any, reach none of the controllers, here and in the run of one."""
     line = without_effect(settings, controllers) if isinstance(settings, Mapping) else ""
     if line:
         say_once(line)
-        for controller in made:
-            controller.remarks.append(line)
+        made.remarks.append(line)

@@ -54,7 +54,7 @@ class Trip:
     Raises
     ------
     InputError
-        If a name is unknown or a file cannot be used.
+        If a name is unknown, a file cannot be used, or the forecast is neither of the two.
     """
 
     def __init__(
@@ -67,6 +67,11 @@ class Trip:
         self.vehicle = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle)
         self.plant = Plant(self.vehicle)
         self.truth = Trace.of(self.cycle, self.vehicle)
+        if not isinstance(forecast, Trace | Cycle | None):
+            raise InputError(
+                f"the forecast must be a Cycle, or a Trace of demand and speed, not {forecast!r}"
+            )
+        self._given = forecast
         if isinstance(forecast, Cycle):
             forecast = Trace.of(forecast, self.vehicle)
         self.forecast = self.truth if forecast is None else forecast
@@ -107,6 +112,13 @@ class Trip:
     def with_forecast(self, forecast: Trace | Cycle | None) -> "Trip":
         """Return the same trip with another forecast; the truth if None."""
         return Trip(self.cycle, self.vehicle, forecast)
+
+    def with_vehicle(self, vehicle: Vehicle) -> "Trip":
+        """Return the same trip by another vehicle, with the same forecast.
+
+        The demand of a forecast given as a cycle is computed anew; one given as a trace stays.
+        """
+        return Trip(self.cycle, vehicle, self._given)
 
     def same_as(self, other: "Trip") -> bool:
         """Whether cycle, vehicle and forecast are equal number by number."""

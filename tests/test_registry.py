@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from qpmpc import Controller, ControllerSettings, InputError, Planner, Trip, simulate
+from qpmpc.names import Names
 from qpmpc.registry import (
     CONTROLLERS,
     PLANNERS,
@@ -204,3 +205,24 @@ def test_what_goes_wrong_in_a_package_is_one_line(
     assert done.returncode == 2
     assert said in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_shipped_name_stays_and_two_of_one_name_are_said(tmp_path, monkeypatch, caplog) -> None:
+    """Also where the shipped name is of the other kind, controller or planner."""
+    points = {
+        "zebra": "[qpmpc.controllers]\nbaseline-mpc = zebra:A\ntwice = zebra:B\n",
+        "antelope": "[qpmpc.controllers]\nmh-qp = antelope:A\ntwice = antelope:B\n",
+    }
+    for package, text in points.items():
+        folder = tmp_path / f"{package}-1.0.dist-info"
+        folder.mkdir()
+        (folder / "METADATA").write_text(f"Name: {package}\nVersion: 1.0\n")
+        (folder / "entry_points.txt").write_text(text)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    names = Names("controller", CONTROLLERS.shipped, beside=PLANNERS.shipped)
+    assert {name: point.value for name, point in names.added.items()} == {"twice": "antelope:B"}
+    assert sorted(caplog.messages) == [
+        "controller 'baseline-mpc' of zebra:A is not used: a shipped name",
+        "controller 'mh-qp' of antelope:A is not used: a shipped name",
+        "controller 'twice' of zebra:B is not used: antelope:B is",
+    ]

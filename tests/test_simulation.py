@@ -13,10 +13,11 @@ from qpmpc.codegen.host_library import compiler
 from qpmpc.comparison import compare
 from qpmpc.controllers.ecms import Ecms
 from qpmpc.controllers.mh_qp import MhQp
+from qpmpc.controllers.receding_horizon import RecedingHorizon
 from qpmpc.controllers.rule_based import RuleBased
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle
-from qpmpc.errors import InputError
+from qpmpc.errors import InputError, QpmpcError
 from qpmpc.registry import (
     CONTROLLERS,
     PLANNERS,
@@ -255,3 +256,87 @@ def test_what_is_no_settings_is_one_line(trip):
 def test_settings_by_dotted_name_make_a_controller_too(trip):
     made = MhQp(Trip(trip), {"mh_qp.admm.iterations": 25})
     assert made.settings.mh_qp.admm.iterations == 25
+
+
+def test_settings_of_the_vehicle_reach_a_forecast_given_as_a_cycle(trip):
+    """The demand of the forecast is that of the vehicle that drives."""
+    shorter = Cycle.from_samples("shorter", trip.time_s[:15], trip.speed_mps[:15])
+    heavy = {"chassis.mass_kg": 1800.0}
+    run = simulate(Trip(trip, forecast=shorter), "mh-qp", settings=heavy)
+    car = load_vehicle().with_settings(heavy)
+    same = simulate(Trip(trip, car, shorter), "mh-qp")
+    np.testing.assert_array_equal(run.trajectory.p_eng_w, same.trajectory.p_eng_w)
+    np.testing.assert_array_equal(
+        Trip(trip, forecast=shorter).with_vehicle(car).forecast.demand_w,
+        Trip(shorter, car).truth.demand_w,
+    )
+
+
+def test_a_forecast_is_a_cycle_or_a_trace(trip):
+    for wrong in ("nycc", Trip(trip), [1.0, 2.0]):
+        with pytest.raises(InputError, match="the forecast must be a Cycle, or a Trace"):
+            Trip(trip, forecast=wrong)
+
+
+def test_settings_in_the_constructor_are_checked_as_elsewhere(trip):
+    road = Trip(trip)
+    for wrong in ("mhqp.admm.iterations", "thermal.t_amb_degc", "dp.soc_points"):
+        for kind in (MhQp, RuleBased, Ecms):
+            with pytest.raises(InputError, match=rf"no settings {wrong.partition('.')[0]}; here"):
+                kind(road, {wrong: 3})
+
+
+@pytest.mark.parametrize("wrong", [5, None, {}, lambda trip, settings: None, RecedingHorizon, int])
+def test_what_is_no_controller_is_one_line(trip, wrong):
+    for use in (lambda: simulate(trip, wrong), lambda: compare(trip, ["rule-based", wrong])):
+        with pytest.raises(InputError, match="controller"):
+            use()
+
+
+def test_an_abstract_controller_is_one_line_with_what_it_lacks(trip):
+    class Half(Controller):
+        pass
+
+    with pytest.raises(InputError, match="controller 'Half' lacks step"):
+        simulate(trip, Half)
+
+
+def test_a_controller_that_cannot_drive_is_refused_before_any_run(trip):
+    road, told = Trip(trip), []
+    driven = RuleBased(road)
+    simulate(road, driven)
+    with pytest.raises(QpmpcError, match="has driven already"):
+        compare(road, ["mh-qp", driven], next_job=told.append)
+    with pytest.raises(InputError, match="'rule-based' is made for one trip: give its class"):
+        compare([road, "nycc"], [RuleBased(road)], next_job=told.append)
+    assert told == []
+
+
+def test_idle_settings_are_said_in_every_run(trip):
+    runs = compare([trip, "nycc"], "rule-based", settings={"ecms.factor": 3.0})
+    assert [run.remarks for run in runs] == [("no effect on rule-based: ecms.factor",)] * 2
+
+
+def test_a_backend_given_by_name_is_that_of_the_settings(trip):
+    """The settings of ADMM apply to OSQP, and are refused with another backend."""
+    few = {"mh_qp.admm.iterations": 7}
+    run = simulate(Trip(trip), MhQp(Trip(trip), few, solver="osqp"))
+    assert set(run.trajectory.iterations) == {7}
+    with pytest.raises(InputError, match=r"mh_qp\.admm has no effect with mh_qp\.solver=piqp"):
+        MhQp(Trip(trip), few, solver="piqp")
+    in_c = MhQp(Trip(trip), {"mh_qp.implementation": "c"})
+    assert in_c.remarks == ["mh_qp.implementation=c has no effect here: MhQp is in Python"]
+
+
+@pytest.mark.parametrize("band", [(1.1, 0.9), (0.3, 0.5)])
+@pytest.mark.parametrize("implementation", ["c", "python"])
+def test_an_empty_terminal_band_is_one_line(trip, band, implementation):
+    settings = dict(zip(("mh_qp.qp.terminal_low", "mh_qp.qp.terminal_high"), band, strict=True))
+    settings["mh_qp.implementation"] = implementation
+    with pytest.raises(InputError, match=r"leave no terminal SOC: 0\.\d+ is above 0\.\d+"):
+        simulate(trip, settings=settings)
+
+
+def test_a_solver_that_is_no_name_is_refused(trip):
+    with pytest.raises(InputError, match=r"mh_qp\.solver"):
+        simulate(trip, settings={"mh_qp.solver": ["osqp"]})

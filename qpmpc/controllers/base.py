@@ -2,7 +2,7 @@
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from math import isfinite
 from numbers import Real
 from typing import Any, ClassVar, NamedTuple
@@ -77,6 +77,14 @@ class Driver:
             )
         self.trip = trip
         self.settings = as_settings(settings)
+        own = self.name.replace("-", "_")
+        strange = [section for section in self.settings.others if section != own]
+        if strange and isinstance(settings, Mapping):
+            raise InputError(
+                f"{self.name}: no settings {', '.join(strange)}; here names start with one of "
+                f"{', '.join(dict.fromkeys([*self.settings.sections(), own]))}, those of the "
+                "vehicle are given to its trip"
+            )
 
     def own_settings(self) -> BaseModel:
         """Return the values of `Settings`, with what the user set.
@@ -117,6 +125,7 @@ class Controller(Driver, ABC):
     def __init__(self, trip: Trip, settings: SettingsLike | None = None) -> None:
         super().__init__(trip, settings)
         self.remarks: list[str] = []
+        self._lasting_remarks: list[str] = []
         self.safety = SafetyLayer(trip.plant, self.settings.rule_based.heat_power_w)
         self._under_way = False
 
@@ -153,6 +162,19 @@ class Controller(Driver, ABC):
         QpmpcError
             If the controller was made for another trip, or has driven and was not reset.
         """
+        self.check_ready(trip)
+        self._under_way = True
+        self._lasting_remarks = list(self.remarks)
+        self.depart(progress)
+
+    def check_ready(self, trip: Trip) -> None:
+        """Check that the controller can start a run of this trip.
+
+        Raises
+        ------
+        QpmpcError
+            See `begin`.
+        """
         if self._under_way is None:
             raise base_not_called(self)
         if not trip.same_as(self.trip):
@@ -164,11 +186,11 @@ class Controller(Driver, ABC):
             raise QpmpcError(
                 f"controller {self.name!r} has driven already: call reset() before another run"
             )
-        self._under_way = True
-        self.depart(progress)
 
     def reset(self) -> None:
         """Make ready for another run of the same trip, which begins with `depart`."""
+        if self._under_way:
+            self.remarks = list(self._lasting_remarks)  # those of the run are said
         self._under_way = False
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import cvxpy
 
 from qpmpc.controllers.receding_horizon import Plan, Planner
-from qpmpc.controllers.settings import ControllerSettings
+from qpmpc.controllers.settings import SettingsLike
 from qpmpc.errors import InputError, QpmpcError
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.cvxpy_twin import CvxpyTwin
@@ -37,7 +37,7 @@ class CvxpyPlanner(Planner):
     name = "mh-cvxpy"
     solver = "CLARABEL"
 
-    def __init__(self, trip: Trip, settings: ControllerSettings | None = None) -> None:
+    def __init__(self, trip: Trip, settings: SettingsLike | None = None) -> None:
         super().__init__(trip, settings)
         of_qp, vehicle = self.settings.mh_qp, trip.vehicle
         found: list[str] = cp.installed_solvers()

@@ -4,9 +4,8 @@ from collections.abc import Callable
 
 from qpmpc.controllers.qp_planner import QpPlanner, Solve
 from qpmpc.controllers.receding_horizon import RecedingHorizon
-from qpmpc.controllers.settings import ControllerSettings
+from qpmpc.controllers.settings import SettingsLike, as_settings
 from qpmpc.solvers.base import QpSolver
-from qpmpc.solvers.names import make_solver
 from qpmpc.trip import Trip
 
 
@@ -25,16 +24,21 @@ class MhQp(RecedingHorizon):
     def __init__(
         self,
         trip: Trip,
-        settings: ControllerSettings | None = None,
+        settings: SettingsLike | None = None,
         *,
         solver: QpSolver | str | None = None,
         on_solve: Callable[[Solve], None] | None = None,
     ) -> None:
-        backend = make_solver(solver) if isinstance(solver, str) else solver
-        super().__init__(trip, QpPlanner(trip, settings, solver=backend, on_solve=on_solve))
+        of_qp = as_settings(settings).mh_qp
+        if isinstance(solver, str):
+            of_qp, solver = of_qp.model_copy(update={"solver": solver}), None
+        planner = QpPlanner(trip, settings, of_qp, solver=solver, on_solve=on_solve)
+        super().__init__(trip, planner)
+        if of_qp.implementation == "c":
+            self.remarks.append("mh_qp.implementation=c has no effect here: MhQp is in Python")
 
 
-def mh_qp_paper(trip: Trip, settings: ControllerSettings | None = None) -> QpPlanner:
+def mh_qp_paper(trip: Trip, settings: SettingsLike | None = None) -> QpPlanner:
     """Make the planner with the paper's grid and averaged preview."""
-    settings = settings or ControllerSettings()
+    settings = as_settings(settings)
     return QpPlanner(trip, settings, settings.mh_qp_paper, name="mh-qp-paper")

@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.controllers.receding_horizon import Plan, Planner, power_while_on_w
-from qpmpc.controllers.settings import ControllerSettings, MhQpSettings
+from qpmpc.controllers.settings import MhQpSettings, SettingsLike
 from qpmpc.errors import InputError
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.rows import VARS, Var
 from qpmpc.qp.stage_qp import QpData, StageQp
-from qpmpc.solvers.base import QpSolution, QpSolver
+from qpmpc.solvers.base import QpSolution, QpSolver, consistent, failed
 from qpmpc.solvers.names import make_solver
 from qpmpc.solvers.osqp import Osqp
 from qpmpc.solvers.settings import AdmmSettings
@@ -97,7 +97,7 @@ class QpPlanner(Planner):
     def __init__(
         self,
         trip: Trip,
-        settings: ControllerSettings | None = None,
+        settings: SettingsLike | None = None,
         of_qp: MhQpSettings | None = None,
         *,
         name: str = "mh-qp",
@@ -195,14 +195,15 @@ class QpPlanner(Planner):
         cold: bool = False,
     ) -> QpPlan:
         data = self.qp.update(stages, seen.soc, seen.t_cl_degc, about)
-        if not self._is_set_up:
+        fit = consistent(data)
+        if fit and not self._is_set_up:
             self.solver.setup(self.qp.structure, data)
             self._is_set_up = True
         primal = dual = None
         if start is not None:
             primal = data.scaling.solver_primal(start[0].ravel())
             dual = data.scaling.solver_dual(start[1].ravel())
-        solution = self.solver.solve(data, primal, dual, cold=cold)
+        solution = self.solver.solve(data, primal, dual, cold=cold) if fit else failed(data)
         if self.on_solve is not None:
             self.on_solve(Solve(data, primal, dual, cold, solution))
         return QpPlan(

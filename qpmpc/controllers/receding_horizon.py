@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpmpc.controllers.base import Controller, Decision, Driver, Progress, base_not_called
 from qpmpc.controllers.rule_based import RuleBased
-from qpmpc.controllers.settings import ControllerSettings
+from qpmpc.controllers.settings import SettingsLike
 from qpmpc.errors import QpmpcError
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.plant import Command
@@ -104,9 +104,7 @@ class RecedingHorizon(Controller):
         If the planner was made for another trip.
     """
 
-    def __init__(
-        self, trip: Trip, planner: Planner, settings: ControllerSettings | None = None
-    ) -> None:
+    def __init__(self, trip: Trip, planner: Planner, settings: SettingsLike | None = None) -> None:
         if not hasattr(planner, "trip") or not hasattr(planner, "settings"):
             raise base_not_called(planner)
         if not trip.same_road_as(planner.trip):
@@ -125,7 +123,7 @@ class RecedingHorizon(Controller):
     def depart(self, progress: Progress | None = None) -> None:
         """Prepare the planner's first plan."""
         self._rules.reset()
-        self._old = None
+        self._old, self._has_reason = None, False
         self.planner.depart(self.trip.start)
 
     def step(self, seen: Observation) -> Decision:

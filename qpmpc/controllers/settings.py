@@ -235,8 +235,8 @@ def refuse_old_name(key: str, value: object) -> None:
     for old, new in RENAMED.items():
         if rest == old or rest.startswith(f"{old}."):
             raise InputError(f"{key} is now called {section}.{new}{rest.removeprefix(old)}")
-    if rest == "solver" and value in OLD_SOLVERS:
-        now = OLD_SOLVERS[str(value)]
+    if rest == "solver" and isinstance(value, str) and value in OLD_SOLVERS:
+        now = OLD_SOLVERS[value]
         raise InputError(f"{key}={value} is now called {section}.implementation={now}")
 
 

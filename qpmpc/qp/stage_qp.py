@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
+from qpmpc.errors import InputError
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.expressions import code_of, expression
@@ -68,8 +69,23 @@ class QpData:
 def qp_parameters(
     vehicle: Vehicle, model: PwaModel, settings: QpSettings, units: ScalingSettings
 ) -> dict[str, float]:
-    """Collect the numbers of the QP, by their names in its table."""
+    """Collect the numbers of the QP, by their names in its table.
+
+    Raises
+    ------
+    InputError
+        If the terminal SOC band is empty.
+    """
     engine, battery, thermal, trip = vehicle.engine, vehicle.battery, vehicle.thermal, vehicle.trip
+    soc_low = max(settings.terminal_low * trip.soc_init, battery.soc_min)
+    soc_high = min(settings.terminal_high * trip.soc_init, battery.soc_max)
+    if soc_low > soc_high:
+        raise InputError(
+            f"terminal_low={settings.terminal_low:g} and terminal_high={settings.terminal_high:g} "
+            f"times soc_init={trip.soc_init:g}, within soc_min={battery.soc_min:g} and "
+            f"soc_max={battery.soc_max:g}, leave no terminal SOC: {soc_low:g} is above "
+            f"{soc_high:g}"
+        )
     return {
         "engine_max_w": engine.power_max_w,
         "engine_min_w": engine.power_min_w,
@@ -83,8 +99,8 @@ def qp_parameters(
         "soc_init": trip.soc_init,
         # of stages of more than 1 s, above soc_min
         "soc_reserve": settings.soc_reserve * max(trip.soc_init - battery.soc_min, 0.0),
-        "terminal_soc_low": max(settings.terminal_low * trip.soc_init, battery.soc_min),
-        "terminal_soc_high": min(settings.terminal_high * trip.soc_init, battery.soc_max),
+        "terminal_soc_low": soc_low,
+        "terminal_soc_high": soc_high,
         "soc_penalty_g": settings.soc_penalty_g,
         "t_min_degc": thermal.t_cl_min_degc + settings.t_cl_margin_k,
         "t_max_degc": thermal.t_cl_max_degc - T_CL_MAX_MARGIN_K,

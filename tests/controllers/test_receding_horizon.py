@@ -255,3 +255,17 @@ def test_a_planner_has_its_own_settings() -> None:
     run = simulate(PART, ManyWatts, settings={"many_watts.power_w": 9e3})
     assert run.controller == "many-watts"
     assert run.trajectory.p_eng_w.max() == 9e3
+
+
+def test_after_a_reset_the_run_has_its_own_remarks() -> None:
+    class Wild(Planner):
+        def plan(self, seen: Observation) -> Plan:
+            return Plan.none("no time")
+
+    trip = Trip(PART)
+    controller = RecedingHorizon(trip, Wild(trip))
+    controller.remarks.append("made by hand")
+    first = simulate(trip, controller).remarks
+    controller.reset()
+    assert simulate(trip, controller).remarks == first
+    assert first[:2] == ("made by hand", "wild: no plan at 0 s: no time")
