@@ -100,7 +100,8 @@ class GeneratedController(Controller):
         self.of_qp = of_qp or self.settings.mh_qp
         self.name, self.solver_name = name, f"admm {precision}"
         blocks = self.of_qp.horizon.block_count(trip.forecast.steps)
-        values = values_of(trip.vehicle, self.of_qp, self.settings.rule_based, blocks)
+        rules, section = self.settings.rule_based, name.replace("-", "_")
+        values = values_of(trip.vehicle, self.of_qp, rules, blocks, section)
         self.library = build_host_library(values, precision)
         self.fill_s = self.call_s = 0.0
         self.inputs: Inputs = InputBuilder(trip.preview(self.of_qp.horizon), trip.truth)

@@ -109,7 +109,11 @@ class Values:
 
 
 def values_of(
-    vehicle: Vehicle, settings: MhQpSettings, rules: RuleBasedSettings, blocks: int | None = None
+    vehicle: Vehicle,
+    settings: MhQpSettings,
+    rules: RuleBasedSettings,
+    blocks: int | None = None,
+    section: str = "mh_qp",
 ) -> Values:
     """Collect the numbers of a controller.
 
@@ -119,6 +123,7 @@ def values_of(
     settings : of the controller; its `prepared` concerns the caller of the C code
     rules : thresholds of the last rung of the ladder
     blocks : of the long horizon; needed if the settings give the length of a block
+    section : of the settings, for messages
 
     Raises
     ------
@@ -126,13 +131,14 @@ def values_of(
         If there is no long horizon, its number of blocks is open, the terminal band is so narrow
         that the solver would treat it as an equality, or a setting is one of Python's solvers.
     """
-    _refuse_unknown(settings)
+    _refuse_unknown(settings, section)
     model = PwaModel.of(vehicle, settings.pwa)
     line, maps = OptimalLine(vehicle.engine), BatteryMaps(vehicle.battery)
     blocks = settings.horizon.blocks if blocks is None else blocks
     if blocks < 1:
         raise InputError(
-            "generated code needs a fixed number of blocks: set mh_qp.horizon.blocks to 1 or more"
+            f"generated code needs a fixed number of blocks: set {section}.horizon.blocks to 1 or "
+            "more"
         )
     scalars = {
         **qp_parameters(vehicle, model, settings.qp, settings.scaling),
@@ -145,7 +151,7 @@ def values_of(
         band = (scalars["terminal_soc_high"] - scalars["terminal_soc_low"]) / scalars["unit_soc"]
         if band < EQUALITY_WIDTH:
             raise InputError(
-                "mh_qp.qp.terminal_low and terminal_high leave no band for the final SOC "
+                f"{section}.qp.terminal_low and terminal_high leave no band for the final SOC "
                 f"(width {band * scalars['unit_soc']:.2g})"
             )
     grid = vehicle.battery.soc_grid
@@ -182,12 +188,16 @@ def values_of(
     )
 
 
-def _refuse_unknown(settings: MhQpSettings) -> None:
+def _refuse_unknown(settings: MhQpSettings, section: str) -> None:
     """Refuse the settings that generated code does not have."""
     if settings.solver is not None:
-        raise InputError(f"generated C has its own algorithm, not mh_qp.solver={settings.solver}")
+        raise InputError(
+            f"generated C has its own algorithm, not {section}.solver={settings.solver}"
+        )
     if settings.admm.status_tolerance != AdmmSettings().status_tolerance:
-        raise InputError("generated C has no mh_qp.admm.status_tolerance: it never stops early")
+        raise InputError(
+            f"generated C has no {section}.admm.status_tolerance: it never stops early"
+        )
 
 
 def _array(values: ArrayLike) -> NDArray[np.float64]:

@@ -340,3 +340,21 @@ def test_an_empty_terminal_band_is_one_line(trip, band, implementation):
 def test_a_solver_that_is_no_name_is_refused(trip):
     with pytest.raises(InputError, match=r"mh_qp\.solver"):
         simulate(trip, settings={"mh_qp.solver": ["osqp"]})
+
+
+def test_a_subclass_runs_under_its_own_name(trip):
+    class Warmer(MhQp):
+        pass
+
+    class Named(MhQp):
+        name = "named"
+
+    runs = compare(trip, [MhQp, Warmer, Named])
+    assert [run.controller for run in runs] == ["mh-qp", "warmer", "named"]
+
+
+def test_refusals_name_the_section_that_was_set(trip):
+    for section in ("mh_qp", "mh_qp_paper"):
+        chosen = {f"{section}.implementation": "c", f"{section}.solver": "osqp"}
+        with pytest.raises(InputError, match=f"not {section}.solver=osqp"):
+            simulate(trip, section.replace("_", "-"), settings=chosen)

@@ -114,7 +114,9 @@ class RecedingHorizon(Controller):
             )
         super().__init__(trip, settings or planner.settings)
         self.planner = planner
-        self.name, self.solver_name = planner.name, planner.solver_name
+        if type(self) is RecedingHorizon:  # a subclass has its own
+            self.name = planner.name
+        self.solver_name = planner.solver_name
         self._rules = RuleBased(trip, self.settings)
         self._old: Plan | None = None
         self._old_step = 0
