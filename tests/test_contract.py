@@ -163,3 +163,23 @@ def test_a_wrong_target_would_be_noticed() -> None:
     table = Names("thing", {"a": Shipped("qpmpc.registry:no_such_name")})
     with pytest.raises(AssertionError, match="no_such_name"):
         test_every_shipped_name_leads_somewhere(table)
+
+
+def test_folders_of_verification_import_only_from_those_above_them() -> None:
+    """In the order of the table in their README."""
+    folder = FOLDERS["qpmpc.verification"]
+    lines = (folder / "README.md").read_text("utf-8").splitlines()
+    order = [line.split("`")[1].rstrip("/") for line in lines if line.startswith("| `")]
+    assert sorted(order) == sorted(
+        inner.name for inner in folder.iterdir() if (inner / "__init__.py").exists()
+    )
+    prefix = "qpmpc.verification."
+    for name, others in GRAPH.items():
+        if not name.startswith(prefix):
+            continue
+        place = order.index(name.removeprefix(prefix).partition(".")[0])
+        for other in others:
+            if other.startswith(prefix):
+                assert order.index(other.removeprefix(prefix).partition(".")[0]) <= place, (
+                    f"{name} imports {other}"
+                )

@@ -200,7 +200,7 @@ def processor_in_the_loop(
         If the settings do not fit generated code.
     """
     settings = settings or ControllerSettings()
-    blocks = settings.mh_qp.horizon.block_count(trip.steps)
+    blocks = settings.mh_qp.horizon.block_count(trip.forecast.steps)
     values = values_of(trip.vehicle, settings.mh_qp, settings.rule_based, blocks)
     twin = MhQp(trip, settings)
     commands: list[Command] = []

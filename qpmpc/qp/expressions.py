@@ -21,12 +21,18 @@ _ALLOWED = (
     ast.Call,
     ast.Name,
     ast.Constant,
-    ast.operator,
+    ast.Add,
+    ast.Sub,
+    ast.Mult,
+    ast.Div,
     ast.USub,
-    ast.cmpop,
+    ast.Eq,
+    ast.Lt,
+    ast.LtE,
+    ast.Gt,
+    ast.GtE,
     ast.expr_context,
 )
-_REFUSED = (ast.Pow, ast.Mod, ast.MatMult, ast.FloorDiv, ast.LShift, ast.RShift, ast.BitAnd)
 
 
 class FormulaError(QpmpcError):
@@ -47,7 +53,7 @@ def parsed(text: str) -> list[ast.stmt]:
         raise FormulaError(f"no formula: {error.text!r}") from error
     for node in ast.walk(tree):
         number = not isinstance(node, ast.Constant) or isinstance(node.value, float)
-        if not isinstance(node, _ALLOWED) or isinstance(node, _REFUSED) or not number:
+        if not isinstance(node, _ALLOWED) or not number:
             raise FormulaError(f"{type(node).__name__} is not for formulas: {text.strip()[:80]!r}")
     return tree.body
 
