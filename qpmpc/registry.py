@@ -232,19 +232,18 @@ def without_effect(settings: Mapping[str, object], controllers: Sequence[Control
     if not all(isinstance(what, str) and what in _READS for what in controllers):
         return ""
     names = [what for what in controllers if isinstance(what, str)]
-    read = {section for name in names for section in _READS[name]}
-    idle = sorted(
-        key for key in settings if key.partition(".")[0] not in {*Vehicle.model_fields, *read}
-    )
+    read = [*Vehicle.model_fields, *(part for name in names for part in _READS[name])]
+    idle = sorted(key for key in settings if not key.startswith(tuple(f"{part}." for part in read)))
     return f"no effect on {', '.join(names)}: {', '.join(idle)}" if idle else ""
 
 
-# Sections of settings that shipped controllers read; the rules are the last rung of most.
+# Settings that shipped controllers read, by the beginning of their names; the rules are the last
+# rung of most.
 _READS = {
     "mh-qp": ("mh_qp", "rule_based"),
     "mh-qp-paper": ("mh_qp_paper", "rule_based"),
     "baseline-mpc": ("baseline_mpc", "rule_based"),
-    "mh-nlp": ("mh_qp", "rule_based"),
+    "mh-nlp": ("mh_qp.horizon", "mh_qp.qp", "rule_based"),
     "rule-based": ("rule_based",),
     "ecms": ("ecms", "rule_based"),
     "dp": ("dp",),

@@ -243,6 +243,10 @@ def test_settings_without_effect_are_said(trip, caplog):
     line = "no effect on rule-based: ecms.factor, mh_qp.admm.iterations"
     assert run.summary()["remarks"] == [line]
     assert caplog.messages == [line]
+    of_nlp = {"mh_qp.qp.t_cl_margin_k": 1.0, "mh_qp.admm.iterations": 25}
+    assert simulate(trip, "mh-nlp", settings=of_nlp).summary()["remarks"] == [
+        "no effect on mh-nlp: mh_qp.admm.iterations"
+    ]
     quiet = simulate(trip, "rule-based", settings={"rule_based.on_w": 7e3})
     assert quiet.summary()["remarks"] == []
 

@@ -23,7 +23,7 @@ from qpmpc.vehicle import PlantState, Vehicle, load_vehicle
 from qpmpc.verification.independent.equations import Equations
 from qpmpc.verification.nonlinear.comparison import compare, compare_open_loop
 from qpmpc.verification.nonlinear.maps import RoundedTable, SmoothMaps
-from qpmpc.verification.nonlinear.mh_nlp import MhNlp, MhNlpSettings
+from qpmpc.verification.nonlinear.mh_nlp import MhNlp
 from qpmpc.verification.nonlinear.problem import NlpVar
 from qpmpc.verification.nonlinear.solver import NlpPlan
 
@@ -41,9 +41,8 @@ def beginning(name: str, steps: int) -> Cycle:
     return Cycle(name, whole.time_s[inside], whole.speed_mps[inside], whole.grade[inside])
 
 
-def planner(cycle: Cycle, vehicle: Vehicle = VEHICLE, on_off: str = "relaxed") -> MhNlp:
-    chosen = MhNlpSettings.model_validate({"on_off": on_off})
-    return MhNlp(Trip(cycle, vehicle), of_nlp=chosen)
+def planner(cycle: Cycle, vehicle: Vehicle = VEHICLE) -> MhNlp:
+    return MhNlp(Trip(cycle, vehicle))
 
 
 def plan_of(nlp: MhNlp, step: int, soc: float, t_cl_degc: float) -> NlpPlan:
@@ -166,26 +165,6 @@ def test_warm_equals_cold() -> None:
         assert warm.solved
         assert cold.solved
         assert warm.cost_g == pytest.approx(cold.cost_g, abs=1e-3)
-
-
-def test_price_makes_short_stages_integral() -> None:
-    """Where the relaxed on-share is fractional, the homotopy takes it to 0 or 1, at a price."""
-    cycle = beginning("hwfet", 300)
-    relaxed, priced = planner(cycle), planner(cycle, on_off="homotopy")
-    tried = 0
-    for step in range(0, 300, 3):
-        before = plan_of(relaxed, step, 0.6, 55.0)
-        share = before.z[:5, NlpVar.ON]
-        if np.all(np.minimum(share, 1.0 - share) < 0.1):
-            continue
-        after = plan_of(priced, step, 0.6, 55.0)
-        end = after.z[:5, NlpVar.ON]
-        assert np.minimum(end, 1.0 - end).max() < np.minimum(share, 1.0 - share).max()
-        assert after.cost_g > before.cost_g - 1e-3
-        tried += 1
-        if tried == 3:
-            break
-    assert tried
 
 
 @pytest.mark.parametrize(

@@ -73,7 +73,7 @@ class NlpProblem:
     is convex but for alpha(T) and the voltage, which a product sigma P is not.
 
     sigma is the share of the stage with the engine on: exact for long stages, whose seconds may
-    differ, and a relaxation for those of one second. There, `on_off_g` prices sigma (1 - sigma).
+    differ, and a relaxation for those of one second.
 
     Parameters
     ----------
@@ -96,7 +96,6 @@ class NlpProblem:
         missing = ca.MX.sym("missing")  # of SOC, in solver units
         road = ca.MX.sym("road", 6, n)  # h, P0, v, l, least and most engine power
         state = ca.MX.sym("state", 2)
-        on_off_g = ca.MX.sym("on_off_g")
         x = z * ca.repmat(ca.DM(UNIT), 1, n)
         before = ca.horzcat(state, x[: NlpVar.T_CL + 1, :-1])
         parts = []
@@ -106,13 +105,11 @@ class NlpProblem:
                 parts.append(stage(before[:, inside], x[:, inside], road[:, inside]))
         fuel_g, soc_gain, t_cl_gap = (ca.horzcat(*part) for part in zip(*parts, strict=True))
         sigma = x[NlpVar.ON, :]
-        short = sigma[:, :short_stages]
         cost = ca.sum2(fuel_g) + self.settings.slack_g_per_k * ca.sum2(x[NlpVar.T_SLACK, :])
         cost += SOC_SHORTFALL_G * UNIT[NlpVar.SOC] * missing
         cost += WASTE_G * ca.sum2(soc_gain) / UNIT[NlpVar.SOC]
         weight = ca.if_else(road[0, :] > 0.0, REGULARISATION, MASKED_REGULARISATION)
         cost += ca.sum2(weight * ca.sum1(z[NlpVar.ABOVE :, :] ** 2))
-        cost += on_off_g * ca.sum2(short * (1.0 - short))
         if self.settings.soc_penalty_g:
             cost += self.settings.soc_penalty_g * (x[NlpVar.SOC, -1] - trip.soc_init) ** 2
         rows = ca.vertcat(
@@ -126,7 +123,7 @@ class NlpProblem:
         self.rows_per_stage = rows.shape[0]
         self.program: dict[str, Any] = {
             "x": ca.vertcat(ca.vec(z), missing),
-            "p": ca.vertcat(ca.vec(road), state, on_off_g),
+            "p": ca.vertcat(ca.vec(road), state),
             "f": cost,
             "g": ca.vec(rows),
         }
@@ -182,14 +179,13 @@ class NlpProblem:
         upper[:, 4] = thermal.t_cl_max_degc - T_CL_MAX_MARGIN_K
         return lower, upper
 
-    def data(self, stages: Stages, soc: float, t_cl_degc: float, on_off_g: float = 0.0) -> NlpData:
+    def data(self, stages: Stages, soc: float, t_cl_degc: float) -> NlpData:
         """Parameters and bounds for a horizon and a state.
 
         Parameters
         ----------
         stages : the trip ahead
         soc, t_cl_degc : state at its start
-        on_off_g : price of sigma (1 - sigma) in the short stages, g
         """
         battery, engine = self.vehicle.battery, self.vehicle.engine
         net = stages.net_w
@@ -215,7 +211,7 @@ class NlpProblem:
         row_lower[:, SOC_ROW] = self._soc_low(stages, soc) / UNIT[NlpVar.SOC]
         return NlpData(
             power_least_w=least,
-            parameters=np.concatenate([road.ravel(order="F"), [soc, t_cl_degc, on_off_g]]),
+            parameters=np.concatenate([road.ravel(order="F"), [soc, t_cl_degc]]),
             lower=np.append(lower.ravel(), 0.0),
             upper=np.append(upper.ravel(), np.inf),
             row_lower=row_lower.ravel(),

@@ -107,7 +107,6 @@ class NlpSolver:
         soc: float,
         t_cl_degc: float,
         start: NlpPlan | None = None,
-        on_off_g: float = 0.0,
     ) -> NlpPlan:
         """Solve for a horizon and a state, from `start`, or from cold.
 
@@ -116,9 +115,8 @@ class NlpSolver:
         stages : the trip ahead
         soc, t_cl_degc : state at its start
         start : plan to start from
-        on_off_g : price of sigma (1 - sigma) in the short stages
         """
-        data = self.problem.data(stages, soc, t_cl_degc, on_off_g)
+        data = self.problem.data(stages, soc, t_cl_degc)
         if start is None:
             x0 = np.clip(self._departure(soc, t_cl_degc), data.lower, data.upper)
             return self._plan(stages, self._cold, data, x0=x0)
