@@ -2,7 +2,7 @@
 
 import ctypes
 from time import perf_counter
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +21,6 @@ from qpmpc.vehicle.plant import Command
 Floats = NDArray[np.float64]
 RUNGS = ("", "shifted plan", "rule-based")
 FLAGS = {1: "bad measurement", 2: "bad preview", 4: "solver failed", 8: "warming up"}
-
-
-class Inputs(Protocol):
-    """Fills in the C controller's input."""
-
-    def fill(self, seen: Observation, into: Any) -> None:
-        """Write all inputs of one step."""
 
 
 class InputBuilder:
@@ -74,7 +67,7 @@ class GeneratedController(Controller):
 
     Attributes
     ----------
-    inputs : fills in the C code's input each second; `ForecastInputs` does that in C
+    inputs : fills in the C code's input each second
     fill_s, call_s : wall time of the last step, s: of filling in its input, and of the C call
 
     Raises
@@ -104,7 +97,7 @@ class GeneratedController(Controller):
         values = values_of(trip.vehicle, self.of_qp, rules, blocks, section)
         self.library = build_host_library(values, precision)
         self.fill_s = self.call_s = 0.0
-        self.inputs: Inputs = InputBuilder(trip.preview(self.of_qp.horizon), trip.truth)
+        self.inputs = InputBuilder(trip.preview(self.of_qp.horizon), trip.truth)
         self._state = ctypes.create_string_buffer(self.library.state_bytes)
         self._in, self._out = self.library.input_type(), self.library.output_type()
         self._arguments = (self._state, ctypes.byref(self._in), ctypes.byref(self._out))

@@ -44,25 +44,26 @@ def rows_files(scalars: Iterable[str], algorithm: str) -> dict[str, str]:
     }
     if algorithm == "osqp":
         return files | {"mpc_rows_osqp.h": osqp_h()}
-    return files | {"mpc_rows_factor.h": factor_h(), "mpc_rows_admm.h": admm_h()}
+    e = Elimination()  # one order of pivots for all of the solver
+    return files | {"mpc_rows_factor.h": factor_h(e), "mpc_rows_admm.h": admm_h(e)}
 
 
-def factor_h() -> str:
+def factor_h(e: Elimination) -> str:
     """Return `mpc_rows_factor.h`: the type of a stage's factor."""
     what = "Factor of a stage."
-    return header("mpc_rows_factor.h", what, ["mpc_rows.h"], factor_type(Elimination()))
+    return header("mpc_rows_factor.h", what, ["mpc_rows.h"], factor_type(e))
 
 
-def admm_h() -> str:
+def admm_h(e: Elimination) -> str:
     """Return `mpc_rows_admm.h`: the code of an iteration, row by row."""
     return header(
         "mpc_rows_admm.h",
         "An iteration of ADMM, row by row.",
         ["mpc_admm.h", "mpc_parts.h"],
         _multiply(),
-        factorise(Elimination()),
+        factorise(e),
         _right_hand_side(),
-        substitute(Elimination()),
+        substitute(e),
         _update_z_y(),
     )
 

@@ -49,8 +49,7 @@ int32_t mpc_check_preview(const mpc_in *in)
     }
     for (int32_t k = 0; k < MPC_LONG; k++) {
         fine &= within(in->long_duration_s[k], REAL(0.0), LONGEST_STAGE_S);
-        fine &= within(in->long_net_w[k], -LARGEST_POWER_W, LARGEST_POWER_W);
-        fine &= within(in->long_speed_mps[k], REAL(0.0), LARGEST_SPEED_MPS);
+        fine &= mpc_check_second(in->long_net_w[k], in->long_speed_mps[k]);
         fine &= within(in->long_internal_off_w[k], -LARGEST_POWER_W, LARGEST_POWER_W);
     }
     return fine;

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from qpmpc.controllers.qp_planner import QpPlanner, Solve
 from qpmpc.controllers.receding_horizon import RecedingHorizon
 from qpmpc.controllers.settings import SettingsLike, as_settings
+from qpmpc.remarks import say_once
 from qpmpc.solvers.base import QpSolver
 from qpmpc.trip import Trip
 
@@ -35,7 +36,9 @@ class MhQp(RecedingHorizon):
         planner = QpPlanner(trip, settings, of_qp, solver=solver, on_solve=on_solve)
         super().__init__(trip, planner)
         if of_qp.implementation == "c":
-            self.remarks.append("mh_qp.implementation=c has no effect here: MhQp is in Python")
+            line = "mh_qp.implementation=c has no effect here: MhQp is in Python"
+            self.remarks.append(line)
+            say_once(line)
 
 
 def mh_qp_paper(trip: Trip, settings: SettingsLike | None = None) -> QpPlanner:

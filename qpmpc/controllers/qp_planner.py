@@ -195,15 +195,17 @@ class QpPlanner(Planner):
         cold: bool = False,
     ) -> QpPlan:
         data = self.qp.update(stages, seen.soc, seen.t_cl_degc, about)
-        fit = consistent(data)
-        if fit and not self._is_set_up:
+        if not self._is_set_up and consistent(data):
             self.solver.setup(self.qp.structure, data)
             self._is_set_up = True
         primal = dual = None
         if start is not None:
             primal = data.scaling.solver_primal(start[0].ravel())
             dual = data.scaling.solver_dual(start[1].ravel())
-        solution = self.solver.solve(data, primal, dual, cold=cold) if fit else failed(data)
+        if self._is_set_up:
+            solution = self.solver.solve(data, primal, dual, cold=cold)
+        else:
+            solution = failed(data)
         if self.on_solve is not None:
             self.on_solve(Solve(data, primal, dual, cold, solution))
         return QpPlan(

@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 import pytest
+from forecast_inputs import ForecastInputs
 
 from qpmpc.closed_loop import drive
 from qpmpc.codegen.controller import GeneratedController, InputBuilder
-from qpmpc.codegen.forecast_inputs import ForecastInputs
 from qpmpc.codegen.host_library import HostLibrary, build_host_library, compiler
 from qpmpc.codegen.values import values_of
 from qpmpc.controllers.settings import ControllerSettings
