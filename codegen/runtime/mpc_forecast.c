@@ -134,7 +134,8 @@ static void fill_long(const mpc_forecast *forecast, int32_t is_arriving, mpc_in 
     }
 }
 
-int32_t mpc_in_from_preview(mpc_forecast *forecast, int32_t step, const mpc_road *seen, mpc_in *in)
+/* Apart from mpc_in_from_preview, which nothing in this file may call alone (MISRA C:2012 8.7). */
+static int32_t fill(mpc_forecast *forecast, int32_t step, const mpc_road *seen, mpc_in *in)
 {
     const int32_t is_under_way = ((step >= 0) && (seen->steps > 0)) ? 1 : 0;
     const int32_t ahead = (is_under_way != 0) ? seen->steps : 0;
@@ -153,14 +154,19 @@ int32_t mpc_in_from_forecast(mpc_forecast *forecast, int32_t step, mpc_in *in)
 {
     const mpc_road *const trip = &forecast->trip;
     const int32_t is_under_way = ((step >= 0) && (step < trip->steps)) ? 1 : 0;
+    const int32_t from = (is_under_way != 0) ? step : 0;
     mpc_road seen = *trip;
-    seen.steps = 0;
+    seen.steps = (is_under_way != 0) ? (trip->steps - from) : 0;
     if (is_under_way != 0) {
-        seen.steps = trip->steps - step;
-        seen.demand_w = &trip->demand_w[step];
-        seen.speed_mps = &trip->speed_mps[step];
+        seen.demand_w = &trip->demand_w[from];
+        seen.speed_mps = &trip->speed_mps[from];
     }
-    return mpc_in_from_preview(forecast, step, &seen, in);
+    return fill(forecast, step, &seen, in);
+}
+
+int32_t mpc_in_from_preview(mpc_forecast *forecast, int32_t step, const mpc_road *seen, mpc_in *in)
+{
+    return fill(forecast, step, seen, in);
 }
 
 int32_t mpc_forecast_bytes(void) { return (int32_t)sizeof(mpc_forecast); }
