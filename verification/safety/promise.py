@@ -1,4 +1,4 @@
-"""How far the safety layer is from the best command of a second: the statement of docs/safety.md."""
+"""Distance of the safety layer from the best command of a second, as stated in docs/safety.md."""
 
 from dataclasses import dataclass
 
