@@ -110,20 +110,22 @@ def replace_file(
     # a name that nobody can guess, and "x": nothing that is there already is opened
     temporary = file.with_name(f".{secrets.token_hex(8)}.tmp")
     try:
-        with temporary.open("xb") as stream:
-            if mode is not None:
-                os.fchmod(stream.fileno(), mode)
-            stream.write(content)
-            if durable:
-                stream.flush()
-                os.fsync(stream.fileno())
-        temporary.replace(file)
+        stream = temporary.open("xb")
+        try:
+            with stream:
+                if mode is not None:
+                    os.fchmod(stream.fileno(), mode)
+                stream.write(content)
+                if durable:
+                    stream.flush()
+                    os.fsync(stream.fileno())
+            temporary.replace(file)
+        finally:
+            temporary.unlink(missing_ok=True)
         if durable:
             _sync_folder(file.parent)
     except OSError as error:  # of the file that the user knows, not of the temporary one
         raise OSError(error.errno, error.strerror, str(file)) from error
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def json_text(data: Any) -> str:
