@@ -205,6 +205,7 @@ def _descriptor(file: Path) -> int | None:
 def _sync_folder(folder: Path) -> None:
     handle = os.open(folder, os.O_RDONLY)
     try:
-        os.fsync(handle)
+        with suppress(OSError):  # some network file systems do not sync folders
+            os.fsync(handle)
     finally:
         os.close(handle)

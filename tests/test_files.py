@@ -91,6 +91,15 @@ def test_both_names_of_a_file_stay_names_of_it(tmp_path):
     assert (tmp_path / "other").read_text() == "new"
 
 
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
+def test_a_file_of_another_owner_stays_theirs(tmp_path):
+    file = tmp_path / "file"
+    file.write_text("old and longer")
+    os.chown(file, 12345, 12345)
+    write_text(file, "new")
+    assert (file.read_text(), file.stat().st_uid, file.stat().st_gid) == ("new", 12345, 12345)
+
+
 @pytest.mark.parametrize("through_a_link", [False, True])
 def test_a_fifo_gets_the_content_and_stays(tmp_path, through_a_link):
     fifo = tmp_path / "fifo"
