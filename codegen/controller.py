@@ -1,6 +1,7 @@
 """The generated C controller behind the Python API of any controller."""
 
 import ctypes
+from collections.abc import Callable
 from time import perf_counter
 from typing import Any
 
@@ -11,16 +12,15 @@ from qpmpc.codegen.generate import Precision
 from qpmpc.codegen.host_library import build_host_library
 from qpmpc.codegen.values import values_of
 from qpmpc.controllers.base import Controller, Decision, Progress
+from qpmpc.controllers.monitor import Flag
 from qpmpc.controllers.settings import ControllerSettings, MhQpSettings
-from qpmpc.preview.forecast import Trace
-from qpmpc.preview.stages import StageBuilder
+from qpmpc.preview.stages import Preview
 from qpmpc.qp.rows import VARS
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.plant import Command
 
 Floats = NDArray[np.float64]
 RUNGS = ("", "shifted plan", "rule-based")
-FLAGS = {1: "bad measurement", 2: "bad preview", 4: "solver failed", 8: "warming up"}
 
 
 class InputBuilder:
@@ -28,31 +28,26 @@ class InputBuilder:
 
     Parameters
     ----------
-    preview : cuts the trip into stages
-    truth : trace for the short horizon
+    receive : returns the preview of a second; the C code checks it
     """
 
-    def __init__(self, preview: StageBuilder, truth: Trace) -> None:
-        self._preview = preview
-        self._steps = truth.steps
-        self._short = preview.settings.short_stages
-        padding = np.zeros(self._short)
-        self._demand_w = np.concatenate([truth.demand_w, padding])
-        self._speed_mps = np.concatenate([truth.speed_mps, padding])
+    def __init__(self, receive: Callable[[int], Preview]) -> None:
+        self._receive = receive
 
     def fill(self, seen: Observation, into: Any) -> None:
         """Write all inputs of one step."""
-        stages, now, n = self._preview.at(seen.step), seen.step, self._short
         into.soc, into.t_cl_degc = seen.soc, seen.t_cl_degc
         into.demand_w, into.speed_mps = seen.demand_w, seen.speed_mps
-        into.short_count = min(n, self._steps - now)
-        into.short_demand_w[:] = self._demand_w[now : now + n].tolist()
-        into.short_speed_mps[:] = self._speed_mps[now : now + n].tolist()
-        long = len(stages.duration_s) - n
-        into.long_duration_s[:long] = stages.duration_s[n:].tolist()
-        into.long_net_w[:long] = stages.net_w[n:].tolist()
-        into.long_speed_mps[:long] = stages.speed_mps[n:].tolist()
-        into.long_internal_off_w[:long] = stages.internal_off_w[n:].tolist()
+        into.engine_on, into.second = int(seen.engine_on), seen.step
+        preview = self._receive(seen.step)
+        into.short_count = preview.short_count
+        into.short_demand_w[:] = preview.short_demand_w.tolist()
+        into.short_speed_mps[:] = preview.short_speed_mps.tolist()
+        long = preview.long
+        into.long_duration_s[:] = long.duration_s.tolist()
+        into.long_net_w[:] = long.net_w.tolist()
+        into.long_speed_mps[:] = long.speed_mps.tolist()
+        into.long_internal_off_w[:] = long.internal_off_w.tolist()
 
 
 class GeneratedController(Controller):
@@ -79,7 +74,7 @@ class GeneratedController(Controller):
     """
 
     implementation = "c"
-    has_safety_layer = True  # in C
+    has_monitor = has_safety_layer = True  # in C
 
     def __init__(
         self,
@@ -98,7 +93,7 @@ class GeneratedController(Controller):
         self.library = build_host_library(values, precision)
         self.remarks += filter(None, [self.library.remark])
         self.fill_s = self.call_s = 0.0
-        self.inputs = InputBuilder(trip.preview(self.of_qp.horizon), trip.truth)
+        self.inputs = InputBuilder(trip.preview(self.of_qp.horizon).receive)
         self._state = ctypes.create_string_buffer(self.library.state_bytes)
         self._in, self._out = self.library.input_type(), self.library.output_type()
         self._arguments = (self._state, ctypes.byref(self._in), ctypes.byref(self._out))
@@ -145,4 +140,5 @@ def decision_of(out: Any) -> Decision:
         out.iterations,
         float(out.relaxation_gap) if planned else float("nan"),
         float(out.on_share) if planned else float("nan"),
+        Flag(out.flags),
     )

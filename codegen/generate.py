@@ -191,5 +191,6 @@ def _context(
         "scalars": scalars | counts,
         "counts": counts,
         "arrays": {name: rows(array) for name, array in values.arrays.items()},
+        "fuel_stride": 1 << ((values.sizes.fuel_points - 1).bit_length() - 1),
         "stretch": _STRETCH.get(exponent, power),
     }

@@ -21,7 +21,7 @@ from qpmpc.files import write_text
 from qpmpc.qp.rows import VARS
 from qpmpc.remarks import say_once
 
-ABI_VERSION = 2
+ABI_VERSION = 3
 _ABI_NAMES = (
     "version",
     "sizeof mpc_real",
@@ -73,6 +73,8 @@ def structures(precision: Precision, short: int, long: int) -> tuple[Any, Any]:
             ("long_speed_mps", real * long),
             ("long_internal_off_w", real * long),
             ("short_count", ctypes.c_int32),
+            ("second", ctypes.c_int32),
+            ("engine_on", ctypes.c_int32),
         ]
 
     class MpcOut(ctypes.Structure):

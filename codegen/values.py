@@ -1,16 +1,17 @@
 """The numbers of one generated controller: sizes, parameters and tables, as in the runtime."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpmpc.codegen.forecast_values import fixed_block_s, forecast_scalars
-from qpmpc.controllers import qp_planner, receding_horizon, safety
+from qpmpc.controllers import monitor, qp_planner, receding_horizon, safety
 from qpmpc.controllers.qp_planner import DEPARTURE_LINEARISATIONS, WARM_UP_STEPS
 from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS
 from qpmpc.controllers.settings import MhQpSettings, RuleBasedSettings
 from qpmpc.errors import InputError
+from qpmpc.preview import checked
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp import linearisation, rows, stage_qp
 from qpmpc.qp.quantities import pieces_of
@@ -20,6 +21,7 @@ from qpmpc.solvers import base
 from qpmpc.solvers.settings import AdmmSettings
 from qpmpc.vehicle import demand
 from qpmpc.vehicle.battery import BatteryMaps
+from qpmpc.vehicle.capability import Capability
 from qpmpc.vehicle.engine import OptimalLine
 from qpmpc.vehicle.parameters import Vehicle
 
@@ -33,7 +35,9 @@ CONSTANTS: dict[str, dict[str, float]] = {
         (receding_horizon, "ON_THRESHOLD"),
         (qp_planner, "FAILURES_FORGIVEN LEAST_SIZE_W"),
         (linearisation, "COLDEST_DEGC HOTTEST_DEGC DEPARTURE_FUEL_G_PER_S DEPARTURE_P_ENG_W"),
-        (safety, "SOC_MARGIN T_CL_MARGIN_K T_CL_COOLING_K T_CL_NEAR_K BISECTIONS"),
+        (safety, "POWER_MARGIN_W SOC_MARGIN T_CL_MARGIN_K"),
+        (monitor, "LONG_AGO_S LONGEST_GAP_S"),
+        (checked, "LONGEST_STAGE_S NEWS"),
         (stage_qp, "LEAST_COST"),
         (rows, "SHORTEST_SCALE_S REACH_MARGIN_SOC ACCURATE_STAGE_S SIGMA_FORCED"),
         (base, "LARGEST_PLAUSIBLE"),
@@ -210,7 +214,9 @@ def _plant(vehicle: Vehicle, line: OptimalLine, maps: BatteryMaps) -> dict[str, 
     return {
         "fuel_step_w": float(line.power_w[1] - line.power_w[0]),  # grid of fuel_g_per_s, from 0
         **{f"cold_{name}": float(value) for name, value in cold.model_dump().items()},
+        **{f"can_{name}": value for name, value in asdict(Capability.of(vehicle)).items()},
         "charge_c": maps.charge_c,
+        "start_fuel_g": vehicle.engine.start_fuel_g,
         "aux_power_w": vehicle.battery.aux_power_w,
         "t_cl_init_degc": vehicle.trip.t_cl_init_degc,
         "plan_voltage_v": maps.open_circuit.at(soc_init),

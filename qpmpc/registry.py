@@ -53,6 +53,7 @@ CHECKS = Names(
             "nlp-loop",
             "balances",
             "physics",
+            "safety",
             "epa",
             "bounds",
         )

@@ -7,6 +7,7 @@ import numpy as np
 
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.errors import InputError
+from qpmpc.preview.checked import CheckedPreview
 from qpmpc.preview.forecast import Trace
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.preview.stages import StageBuilder
@@ -105,9 +106,10 @@ class Trip:
         """Observation at departure."""
         return self.observation(0, self.plant.initial_state())
 
-    def preview(self, horizon: HorizonSettings) -> StageBuilder:
-        """Return the builder that cuts the trip ahead into stages, at any second."""
-        return StageBuilder(self.vehicle, self.truth, self.forecast, horizon)
+    def preview(self, horizon: HorizonSettings) -> CheckedPreview:
+        """Return the trip ahead, cut into stages at any second and checked."""
+        source = StageBuilder(self.vehicle, self.truth, self.forecast, horizon)
+        return CheckedPreview(source, self.vehicle)
 
     def with_forecast(self, forecast: Trace | Cycle | None) -> "Trip":
         """Return the same trip with another forecast; the truth if None."""

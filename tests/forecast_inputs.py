@@ -67,6 +67,7 @@ class ForecastInputs:
         """Write all inputs of one step."""
         into.soc, into.t_cl_degc = seen.soc, seen.t_cl_degc
         into.demand_w, into.speed_mps = seen.demand_w, seen.speed_mps
+        into.engine_on = int(seen.engine_on)
         if self._same:
             self._from_forecast(self._memory, seen.step, ctypes.byref(into))
         else:

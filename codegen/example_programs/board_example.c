@@ -121,6 +121,7 @@ static void read_sensors(int32_t step)
     in.t_cl_degc = (mpc_real)50.0;
     in.demand_w = demand_w[step];
     in.speed_mps = speed_mps[step];
+    in.engine_on = out.engine_on;
 }
 
 /* YOURS: out.engine_on and out.p_eng_w to the engine's controller. */

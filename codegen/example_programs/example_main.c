@@ -84,8 +84,10 @@ static int32_t read_trip(const char *name)
     return steps;
 }
 
-static void measure(int32_t step, mpc_in *in)
+/* The engine is taken to obey: it ran in the last second if it was told to. */
+static void measure(int32_t step, int32_t engine_on, mpc_in *in)
 {
+    in->engine_on = engine_on;
     in->soc = soc[step];
     in->t_cl_degc = t_cl_degc[step];
     in->demand_w = demand_w[step];
@@ -96,17 +98,19 @@ static void drive(int32_t steps)
 {
     mpc_in in;
     mpc_out out;
+    int32_t engine_on = 0;
     mpc_init(&state);
     (void)mpc_in_from_forecast(&forecast, 0, &in);
-    measure(0, &in);
+    measure(0, engine_on, &in);
     while (mpc_depart(&state, &in) > 0) {
         /* one slice takes no longer than a step */
     }
     (void)printf("time_s,engine_on,p_eng_w,rung,flags\n");
     for (int32_t step = 0; step < steps; step++) {
         (void)mpc_in_from_forecast(&forecast, step, &in);
-        measure(step, &in);
+        measure(step, engine_on, &in);
         (void)mpc_step(&state, &in, &out);
+        engine_on = out.engine_on;
         (void)printf("%d,%d,%.3f,%d,%d\n", (int)step, (int)out.engine_on, (double)out.p_eng_w,
                      (int)out.rung, (int)out.flags);
     }

@@ -141,7 +141,7 @@ class _OnTarget(Controller):
 
     name = "mh-qp"
     implementation = "c"
-    has_safety_layer = True  # in the firmware
+    has_monitor = has_safety_layer = True  # in the firmware
 
     def __init__(
         self, trip: Trip, settings: ControllerSettings, target: Target, label: str
@@ -149,7 +149,7 @@ class _OnTarget(Controller):
         super().__init__(trip, settings)
         self.solver_name = label
         horizon = self.settings.mh_qp.horizon
-        self._target, self._inputs = target, InputBuilder(trip.preview(horizon), trip.truth)
+        self._target, self._inputs = target, InputBuilder(trip.preview(horizon).receive)
         self._in = target.input_type()
         self.departure_instructions: list[int] = []
         self.instructions: list[int] = []

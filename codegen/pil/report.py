@@ -6,9 +6,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from qpmpc.codegen.controller import FLAGS
 from qpmpc.codegen.pil.loop import PilResult
 from qpmpc.codegen.pil.pareto import Pareto
+from qpmpc.controllers.monitor import Flag
 from qpmpc.files import json_text, write_bytes, write_text
 from qpmpc.report.columns import violations_text
 from qpmpc.report.html import html_page
@@ -156,7 +156,7 @@ def _html(
 def _csv(result: PilResult) -> str:
     lines = ["time_s,instructions,engine_on,p_eng_w,python_engine_on,python_p_eng_w,status"]
     for k, flags in enumerate(result.flags.tolist()):
-        status = "; ".join(text for bit, text in FLAGS.items() if flags & bit) or "ok"
+        status = "; ".join(Flag(flags).names()) or "ok"
         lines.append(
             f"{k},{result.instructions[k]},{int(result.command_on[k])},"
             f"{result.command_w[k]:.6g},{int(result.reference_on[k])},"

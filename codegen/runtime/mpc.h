@@ -31,7 +31,7 @@ typedef struct {
     mpc_real soc;       /* measured state of charge, 0..1 */
     mpc_real t_cl_degc; /* measured coolant temperature */
     mpc_real demand_w;  /* power demand of the coming second, negative when braking */
-    mpc_real speed_mps; /* speed of the coming second */
+    mpc_real speed_mps; /* mean speed of the coming second */
     /* accurate preview of the coming seconds; the first is the coming second itself */
     mpc_real short_demand_w[MPC_SHORT];
     mpc_real short_speed_mps[MPC_SHORT];
@@ -45,6 +45,8 @@ typedef struct {
     mpc_real long_speed_mps[MPC_LONG];
     mpc_real long_internal_off_w[MPC_LONG];
     int32_t short_count; /* seconds of the short preview before arrival, 1..MPC_SHORT */
+    int32_t second;      /* clock: seconds since departure */
+    int32_t engine_on;   /* measured: 1 if the engine ran in the last second, else 0 */
 } mpc_in;
 
 /* Rung of the ladder that the command comes from. */
@@ -54,12 +56,14 @@ enum {
     MPC_RULES = 2         /* rules that need no plan */
 };
 
-/* Reasons for a lower rung: bits of mpc_out.flags. */
+/* What was wrong in a second: bits of mpc_out.flags. The first two alone cost no plan. */
 enum {
-    MPC_BAD_MEASUREMENT = 1, /* soc, t_cl_degc, demand_w or speed_mps; the last good one is used */
-    MPC_BAD_PREVIEW = 2,     /* short or long preview; no new plan is made */
+    MPC_BAD_MEASUREMENT = 1, /* the model's prediction from the last good one is used */
+    MPC_BAD_PREVIEW = 2,     /* the last good one is used as long as it reaches */
     MPC_SOLVER_FAILED = 4,   /* no usable solution */
-    MPC_WARMING_UP = 8       /* the solver has not converged yet since a cold start */
+    MPC_WARMING_UP = 8,      /* the solver has not converged yet since a cold start */
+    MPC_BAD_CLOCK = 16, /* a second again, or one that cannot be: then seconds are counted on */
+    MPC_BAD_STATE = 32  /* memory was not initialised, or was corrupted; it is initialised */
 };
 
 typedef struct {
@@ -78,8 +82,8 @@ void mpc_init(mpc_state *state);
 /* Do one slice of the departure: a cold solve, linearised MPC_DEPARTURE_LINEARISATIONS times.
  *
  * To be called after mpc_init, with the same `in`, until it returns 0. Returns 1 while slices
- * remain and -1, having done nothing, on bad input. Once mpc_step has been called there is nothing
- * left to do: it returns 0.
+ * remain and -1, having done nothing, on bad input or without mpc_init. Once mpc_step has been
+ * called there is nothing left to do: it returns 0.
  */
 int32_t mpc_depart(mpc_state *state, const mpc_in *in);
 
@@ -93,7 +97,7 @@ void mpc_plan(const mpc_state *state, mpc_real *x, mpc_real *duals);
 /* Layout of this build, for callers in other languages to check theirs: version of this
  * interface, sizeof mpc_real, mpc_in, mpc_out, mpc_state, then MPC_SHORT, MPC_LONG, MPC_VARS,
  * MPC_ROWS, MPC_ITERATIONS, offset of mpc_in.short_count, of mpc_out.engine_on. */
-#define MPC_ABI_VERSION 2
+#define MPC_ABI_VERSION 3
 #define MPC_ABI_ENTRIES 12
 int32_t mpc_abi(int32_t entry);
 

@@ -1,56 +1,142 @@
-/* Checks of inputs: finite and physically possible. */
+/* Checks of memory and measurements: finite, and possible for this car.
+ *
+ * A measured SOC or coolant temperature is possible if the car could have got there from the value
+ * that the model predicts from the last good one: the reach grows with the seconds since. Else the
+ * prediction is used. Demand and speed are possible if the car can do them; else the last good ones
+ * are used. Time is counted on where the clock is wrong.
+ */
+#include "mpc_constants.h"
+#include "mpc_heat.h"
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-#define LARGEST_POWER_W REAL(1.0e6)
-#define LARGEST_SPEED_MPS REAL(150.0)
-#define COLDEST_DEGC REAL(-60.0)
-#define HOTTEST_DEGC REAL(150.0)
-#define LONGEST_STAGE_S REAL(1.0e5)
+#define NO_VALUE REAL(1.0e20)
 
-/* False for NaN, whatever the bounds. */
-static int32_t within(mpc_real x, mpc_real low, mpc_real high)
-{
-    return ((x >= low) && (x <= high)) ? 1 : 0;
-}
-
-static int32_t take(mpc_real *good, mpc_real value, mpc_real low, mpc_real high)
-{
-    const int32_t fine = within(value, low, high);
-    if (fine != 0) {
-        *good = value;
-    }
-    return fine;
-}
-
-/* Use every good measured value; the others keep the last good one. */
-int32_t mpc_check_measured(mpc_measured *good, const mpc_in *in)
-{
-    int32_t fine = take(&good->soc, in->soc, REAL(0.0), REAL(1.0));
-    fine &= take(&good->t_cl_degc, in->t_cl_degc, COLDEST_DEGC, HOTTEST_DEGC);
-    fine &= take(&good->demand_w, in->demand_w, -LARGEST_POWER_W, LARGEST_POWER_W);
-    fine &= take(&good->speed_mps, in->speed_mps, REAL(0.0), LARGEST_SPEED_MPS);
-    return fine;
-}
+static int32_t is_count(int32_t x, int32_t most) { return ((x >= 0) && (x <= most)) ? 1 : 0; }
 
 /* Check of one second of a trip. */
 int32_t mpc_check_second(mpc_real demand_w, mpc_real speed_mps)
 {
-    return within(demand_w, -LARGEST_POWER_W, LARGEST_POWER_W)
-           & within(speed_mps, REAL(0.0), LARGEST_SPEED_MPS);
+    return within(demand_w, mpc_par.can_demand_min_w, mpc_par.can_demand_max_w)
+           & within(speed_mps, REAL(0.0), mpc_par.can_speed_max_mps);
 }
 
-int32_t mpc_check_preview(const mpc_in *in)
+/* Whether the memory is that of a controller: initialised, and every count in its range. Numbers
+ * of the iterate are checked where they are used. */
+int32_t mpc_check_state(const mpc_state *state)
 {
-    int32_t fine = ((in->short_count >= 1) && (in->short_count <= MPC_SHORT)) ? 1 : 0;
-    for (int32_t k = 0; k < MPC_SHORT; k++) {
-        fine &= mpc_check_second(in->short_demand_w[k], in->short_speed_mps[k]);
+    const mpc_watch *const watch = &state->watch;
+    const mpc_rule_memory *const rules = &state->rules;
+    int32_t fine = ((state->magic == MPC_MAGIC) && (state->magic_end == MPC_MAGIC)) ? 1 : 0;
+    fine &= is_count(state->old_age, MPC_NO_PLAN) & is_count(state->road_age, MPC_NO_PLAN)
+            & is_count(state->heard.age, MPC_NO_PLAN);
+    fine &= is_count(state->phase, MPC_PHASE_RUNNING) & is_count(state->solves, MPC_WARM_UP_STEPS);
+    fine &= is_count(state->failures, FAILURES_FORGIVEN) & is_count(state->is_under_way, 1);
+    fine &= is_count(state->depart_linearisation, MPC_DEPARTURE_LINEARISATIONS);
+    fine &= is_count(state->depart_left, MPC_DEPARTURE_ITERATIONS);
+    fine &= is_count(rules->power_request, 1) & is_count(rules->heat_request, 1);
+    fine &= is_count(rules->on_for_s, mpc_par.rule_min_on_s);
+    fine &= is_count(watch->soc_since_s, LONG_AGO_S) & is_count(watch->t_cl_since_s, LONG_AGO_S);
+    fine &= is_count(watch->has_clock, 1) & is_count(watch->command_on, 1);
+    fine &= within(watch->command_w, REAL(0.0), mpc_par.engine_max_w);
+    fine &= within(watch->good.soc, REAL(0.0), REAL(1.0));
+    fine &= within(watch->good.t_cl_degc, mpc_par.can_coldest_degc, mpc_par.can_hottest_degc);
+    fine &= mpc_check_second(watch->good.demand_w, watch->good.speed_mps);
+    return fine & is_count(watch->good.engine_on, 1);
+}
+
+/* Seconds since the last call, one where the clock cannot be believed. */
+static int32_t elapsed_s(mpc_watch *watch, int32_t second, int32_t *flags)
+{
+    int32_t elapsed = 1;
+    if (watch->has_clock != 0) {
+        const int64_t passed = (int64_t)second - (int64_t)watch->clock;
+        const int32_t is_possible = ((passed >= 0) && (passed <= LONGEST_GAP_S)) ? 1 : 0;
+        elapsed = (is_possible != 0) ? (int32_t)passed : 1;
+        if ((is_possible == 0) || (passed == 0)) {
+            *flags |= MPC_BAD_CLOCK;
+        }
     }
-    for (int32_t k = 0; k < MPC_LONG; k++) {
-        fine &= within(in->long_duration_s[k], REAL(0.0), LONGEST_STAGE_S);
-        fine &= mpc_check_second(in->long_net_w[k], in->long_speed_mps[k]);
-        fine &= within(in->long_internal_off_w[k], -LARGEST_POWER_W, LARGEST_POWER_W);
+    watch->clock = second;
+    return elapsed;
+}
+
+/* SOC and coolant temperature that a second of the last command led to. */
+static void predict(const mpc_watch *watch, mpc_real *soc, mpc_real *t_cl_degc)
+{
+    const mpc_measured *const good = &watch->good;
+    const mpc_real accepted_w = mpc_map_charge_limit_w(good->soc);
+    mpc_real p_bat_w = (good->demand_w + mpc_par.aux_power_w) - watch->command_w;
+    if ((p_bat_w < -accepted_w) && (good->demand_w < REAL(0.0))) {
+        /* the brakes take what the battery cannot */
+        p_bat_w = real_min(-accepted_w, mpc_par.aux_power_w - watch->command_w);
     }
+    const mpc_real current_a = mpc_map_current_a(good->soc, p_bat_w);
+    const mpc_real fuel_w = mpc_map_cold_factor(good->t_cl_degc) * mpc_par.lhv_j_per_g
+                            * mpc_map_fuel_g_per_s(watch->command_w);
+    const mpc_real engine_w = (REAL(1.0) - mpc_par.exhaust_share) * (fuel_w - watch->command_w);
+    const mpc_real heat_w = ((watch->command_on != 0) ? engine_w : REAL(0.0))
+                            - heat_cooling_w(good->t_cl_degc, good->speed_mps);
+    *soc = real_clip(good->soc - (current_a / mpc_par.charge_c), REAL(0.0), REAL(1.0));
+    *t_cl_degc = real_clip(good->t_cl_degc + (heat_w / mpc_par.heat_capacity_j_per_k),
+                           mpc_par.can_coldest_degc, mpc_par.can_hottest_degc);
+}
+
+/* Use a value within reach of what is expected, else that; `since_s` is 0 if it was. */
+static int32_t take(mpc_real *good, mpc_real value, mpc_real expected, mpc_real per_s,
+                    int32_t *since_s)
+{
+    const mpc_real reach = per_s * (mpc_real)(*since_s + 1);
+    const int32_t fine = within(value, expected - reach, expected + reach);
+    *good = (fine != 0) ? value : expected;
+    *since_s = (fine != 0) ? 0 : *since_s;
     return fine;
+}
+
+static int32_t later(int32_t since_s, int32_t passed_s)
+{
+    return (since_s < (LONG_AGO_S - passed_s)) ? (since_s + passed_s) : LONG_AGO_S;
+}
+
+int32_t mpc_check_measured(mpc_watch *watch, const mpc_in *in, int32_t *elapsed)
+{
+    mpc_measured *const good = &watch->good;
+    int32_t flags = 0;
+    mpc_real soc = good->soc;
+    mpc_real t_cl_degc = good->t_cl_degc;
+    *elapsed = elapsed_s(watch, in->second, &flags);
+    const int32_t passed = (watch->has_clock != 0) ? *elapsed : 0;
+    watch->has_clock = 1;
+    watch->soc_since_s = later(watch->soc_since_s, passed);
+    watch->t_cl_since_s = later(watch->t_cl_since_s, passed);
+    if (passed > 0) {
+        predict(watch, &soc, &t_cl_degc);
+    }
+    /* a value out of range is beyond any reach */
+    const mpc_real seen_soc = (within(in->soc, REAL(0.0), REAL(1.0)) != 0) ? in->soc : NO_VALUE;
+    const mpc_real seen_degc =
+        (within(in->t_cl_degc, mpc_par.can_coldest_degc, mpc_par.can_hottest_degc) != 0)
+            ? in->t_cl_degc
+            : NO_VALUE;
+    int32_t fine = take(&good->soc, seen_soc, soc, mpc_par.can_soc_per_s, &watch->soc_since_s);
+    fine &= take(&good->t_cl_degc, seen_degc, t_cl_degc, mpc_par.can_t_cl_k_per_s,
+                 &watch->t_cl_since_s);
+    if (mpc_check_second(in->demand_w, REAL(0.0)) != 0) {
+        good->demand_w = in->demand_w;
+    } else {
+        fine = 0;
+    }
+    if (mpc_check_second(REAL(0.0), in->speed_mps) != 0) {
+        good->speed_mps = in->speed_mps;
+    } else {
+        fine = 0;
+    }
+    if (is_count(in->engine_on, 1) != 0) {
+        good->engine_on = in->engine_on;
+    } else {
+        good->engine_on = watch->command_on;
+        fine = 0;
+    }
+    return flags | ((fine != 0) ? 0 : MPC_BAD_MEASUREMENT);
 }

@@ -141,6 +141,7 @@ static int32_t fill(mpc_forecast *forecast, int32_t step, const mpc_road *seen, 
     const int32_t ahead = (is_under_way != 0) ? seen->steps : 0;
     const int32_t is_arriving = (ahead <= MPC_SHORT) ? 1 : 0;
     in->short_count = (is_arriving != 0) ? ahead : MPC_SHORT;
+    in->second = step;
     if (is_arriving == 0) {
         const int32_t now = (step < MPC_LONGEST_TRIP_S) ? step : MPC_LONGEST_TRIP_S;
         leave_from(forecast, now + MPC_SHORT);

@@ -2,7 +2,8 @@
  *
  *     before the trip: mpc_forecast_start(&forecast, &trip);
  *     every second:    mpc_in_from_forecast(&forecast, step, &in);
- *                      fill in soc, t_cl_degc, demand_w, speed_mps; mpc_step(&state, &in, &out)
+ *                      fill in soc, t_cl_degc, demand_w, speed_mps, engine_on;
+ *                      mpc_step(&state, &in, &out)
  *
  * `step` counts the seconds since departure. The trip's arrays belong to the caller, may lie in
  * flash and must not change until arrival. Only a start reads the whole trip; after it each second
@@ -59,7 +60,7 @@ typedef struct {
  */
 int32_t mpc_forecast_start(mpc_forecast *forecast, const mpc_road *trip);
 
-/* Fill in the preview of the second `step`, the forecast serving as the short preview too.
+/* Fill in the clock and the preview of the second `step`, the forecast serving as the short preview too.
  *
  * Returns 0, or -1 if nothing is ahead: short_count is then 0, and mpc_step flags
  * MPC_BAD_PREVIEW.

@@ -21,16 +21,17 @@ void mpc_iterate_clear(mpc_state *state)
     state->origin_t_cl_degc = REAL(0.0);
 }
 
-/* Short stages move up by 0 or 1 (in equal time); the last keeps its values; long stages keep
- * their place. */
+/* Short stages move up by some seconds (in equal time); the last keeps its values; long stages
+ * keep their place. */
 void mpc_iterate_shift(mpc_state *state, int32_t by)
 {
     for (int32_t k = 0; k < (MPC_SHORT - 1); k++) {
+        const int32_t from = ((k + by) < MPC_SHORT) ? (k + by) : (MPC_SHORT - 1);
         for (int32_t i = 0; i < MPC_VARS; i++) {
-            state->stage[k].x[i] = state->stage[k + by].x[i];
+            state->stage[k].x[i] = state->stage[from].x[i];
         }
         for (int32_t i = 0; i < MPC_ROWS; i++) {
-            state->stage[k].y[i] = state->stage[k + by].y[i];
+            state->stage[k].y[i] = state->stage[from].y[i];
         }
     }
 }

@@ -36,24 +36,38 @@ static mpc_real at_soc(const mpc_real *table, mpc_real soc)
     return value;
 }
 
-/* min(P_chg, I (U + R I)) with the current I that fills the battery to soc_max in a second */
-mpc_real mpc_map_charge_limit_w(mpc_real soc)
-{
-    const mpc_real current = real_max(mpc_par.soc_max - soc, REAL(0.0)) * mpc_par.charge_c;
-    const mpc_real voltage = at_soc(mpc_par.open_circuit_v, soc)
-                             + (at_soc(mpc_par.resistance_charge_ohm, soc) * current);
-    return real_min(mpc_par.battery_charge_max_w, current * voltage);
-}
-
-/* min(P_dis, I (U - R I)) with the current I that empties the battery to soc_min in a second */
-mpc_real mpc_map_discharge_limit_w(mpc_real soc)
+/* Terminal power, discharge positive, that leads from one SOC to another in a second: I (U - R I),
+ * in discharge no more than the battery can give. */
+mpc_real mpc_map_power_to_reach_w(mpc_real soc, mpc_real soc_end)
 {
     const mpc_real voltage = at_soc(mpc_par.open_circuit_v, soc);
-    const mpc_real resistance = at_soc(mpc_par.resistance_discharge_ohm, soc);
-    const mpc_real most = voltage / (REAL(2.0) * resistance); /* beyond it, power falls */
-    const mpc_real emptying = real_max(soc - mpc_par.soc_min, REAL(0.0)) * mpc_par.charge_c;
-    const mpc_real current = real_min(emptying, most);
-    return real_min(mpc_par.battery_discharge_max_w, current * (voltage - (resistance * current)));
+    const mpc_real wanted = (soc - soc_end) * mpc_par.charge_c;
+    const mpc_real resistance = at_soc((wanted >= REAL(0.0)) ? mpc_par.resistance_discharge_ohm
+                                                             : mpc_par.resistance_charge_ohm,
+                                       soc);
+    /* beyond this current, power falls */
+    const mpc_real current = real_min(wanted, voltage / (REAL(2.0) * resistance));
+    return current * (voltage - (resistance * current));
+}
+
+/* Most power that the battery accepts: its limit, or what just fills it to soc_max in a second. */
+mpc_real mpc_map_charge_limit_w(mpc_real soc)
+{
+    const mpc_real filling_w = -mpc_map_power_to_reach_w(soc, mpc_par.soc_max);
+    return real_min(mpc_par.battery_charge_max_w, real_max(filling_w, REAL(0.0)));
+}
+
+/* I = [U - sqrt(U^2 - 4 R P)] / (2 R), written so that no digits are lost at small P; beyond the
+ * most the battery can give it stays at U / (2 R). */
+mpc_real mpc_map_current_a(mpc_real soc, mpc_real power_w)
+{
+    const mpc_real voltage = at_soc(mpc_par.open_circuit_v, soc);
+    const mpc_real resistance = at_soc((power_w >= REAL(0.0)) ? mpc_par.resistance_discharge_ohm
+                                                              : mpc_par.resistance_charge_ohm,
+                                       soc);
+    const mpc_real root = (voltage * voltage) - (REAL(4.0) * resistance * power_w);
+    const mpc_real most = (voltage * voltage) / (REAL(4.0) * resistance);
+    return (REAL(2.0) * real_min(power_w, most)) / (voltage + REAL_SQRT(real_max(root, REAL(0.0))));
 }
 
 /* Internal power of the battery, l(P) = U (U - sqrt(U^2 - 4 R P)) / (2 R), at the plan's SOC.

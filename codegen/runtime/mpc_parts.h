@@ -13,7 +13,8 @@ typedef struct {
 mpc_real mpc_map_fuel_g_per_s(mpc_real p_eng_w);
 mpc_real mpc_map_cold_factor(mpc_real t_cl_degc);
 mpc_real mpc_map_charge_limit_w(mpc_real soc);
-mpc_real mpc_map_discharge_limit_w(mpc_real soc);
+mpc_real mpc_map_power_to_reach_w(mpc_real soc, mpc_real soc_end);
+mpc_real mpc_map_current_a(mpc_real soc, mpc_real power_w);
 mpc_real mpc_map_planned_internal_w(mpc_real power_w);
 mpc_real mpc_pwa_alpha(mpc_real t_cl_degc);
 mpc_real mpc_pwa_alpha_slope(mpc_real t_cl_degc);
@@ -21,6 +22,7 @@ mpc_real mpc_pwa_battery(mpc_real power_w);
 
 /* mpc_qp.c: values of the quadratic program */
 void mpc_qp_road(mpc_state *state, const mpc_in *in);
+void mpc_qp_road_move_up(mpc_state *state, int32_t by);
 void mpc_qp_move_origin(mpc_state *state, mpc_real soc, mpc_real t_cl_degc);
 void mpc_qp_linearise_cold(mpc_state *state);
 void mpc_qp_linearise_about_plan(mpc_state *state);
@@ -45,9 +47,13 @@ int32_t mpc_solver_iterate(mpc_state *state, int32_t count);
 
 /* mpc_safety.c, mpc_rules.c, mpc_check.c */
 mpc_command mpc_safety_admissible(mpc_command wish, const mpc_measured *seen);
-mpc_command mpc_rules_decide(mpc_rule_memory *memory, const mpc_measured *seen);
-int32_t mpc_check_measured(mpc_measured *good, const mpc_in *in);
+mpc_command mpc_rules_decide(mpc_rule_memory *memory, const mpc_measured *seen, int32_t elapsed);
+int32_t mpc_check_state(const mpc_state *state);
+int32_t mpc_check_measured(mpc_watch *watch, const mpc_in *in, int32_t *elapsed);
 int32_t mpc_check_second(mpc_real demand_w, mpc_real speed_mps);
-int32_t mpc_check_preview(const mpc_in *in);
+
+/* mpc_preview.c */
+int32_t mpc_preview_first(mpc_heard *heard, const mpc_in *in);
+int32_t mpc_preview_check(mpc_heard *heard, const mpc_in *in, int32_t elapsed);
 
 #endif

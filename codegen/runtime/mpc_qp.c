@@ -32,6 +32,22 @@ void mpc_qp_road(mpc_state *state, const mpc_in *in)
     }
 }
 
+/* The last good preview, some seconds later: short stages move up and are masked at the end. */
+void mpc_qp_road_move_up(mpc_state *state, int32_t by)
+{
+    for (int32_t k = 0; k < MPC_SHORT; k++) {
+        const int32_t from = k + by;
+        mpc_stage_road *const road = &state->stage[k].road;
+        const mpc_stage_road *const later =
+            &state->stage[(from < MPC_SHORT) ? from : (MPC_SHORT - 1)].road;
+        const mpc_real seen = (from < MPC_SHORT) ? REAL(1.0) : REAL(0.0);
+        road->duration_s = seen * later->duration_s;
+        road->net_w = seen * later->net_w;
+        road->speed_mps = seen * later->speed_mps;
+        road->internal_off_w = seen * later->internal_off_w;
+    }
+}
+
 /* Count SOC and coolant temperature from a newly measured state. */
 void mpc_qp_move_origin(mpc_state *state, mpc_real soc, mpc_real t_cl_degc)
 {

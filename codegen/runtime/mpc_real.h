@@ -3,6 +3,7 @@
 #define MPC_REAL_H
 
 #include <math.h>
+#include <stdint.h>
 
 #include "mpc_config.h"
 
@@ -38,6 +39,11 @@ static inline mpc_real real_max(mpc_real a, mpc_real b) { return REAL_FMAX(a, b)
 static inline mpc_real real_min(mpc_real a, mpc_real b) { return (a < b) ? a : b; }
 static inline mpc_real real_max(mpc_real a, mpc_real b) { return (a > b) ? a : b; }
 #endif
+/* False for NaN, whatever the bounds. */
+static inline int32_t within(mpc_real x, mpc_real low, mpc_real high)
+{
+    return ((x >= low) && (x <= high)) ? 1 : 0;
+}
 static inline mpc_real real_clip(mpc_real x, mpc_real low, mpc_real high)
 {
     return real_min(real_max(x, low), high);

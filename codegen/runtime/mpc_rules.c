@@ -3,7 +3,7 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-mpc_command mpc_rules_decide(mpc_rule_memory *memory, const mpc_measured *seen)
+mpc_command mpc_rules_decide(mpc_rule_memory *memory, const mpc_measured *seen, int32_t elapsed)
 {
     const mpc_real net_w = seen->demand_w + mpc_par.aux_power_w;
     const mpc_real requested_w = net_w
@@ -37,10 +37,9 @@ mpc_command mpc_rules_decide(mpc_rule_memory *memory, const mpc_measured *seen)
     const mpc_command command = mpc_safety_admissible(wish, seen);
     if (command.engine_on == 0) {
         memory->on_for_s = 0;
-    } else if (memory->on_for_s < mpc_par.rule_min_on_s) {
-        memory->on_for_s++; /* stops at the shortest run, so that it cannot overflow */
-    } else {
-        /* long enough */
+    } else { /* stops at the shortest run, so that it cannot overflow */
+        const int32_t on_for_s = memory->on_for_s + elapsed;
+        memory->on_for_s = (on_for_s < mpc_par.rule_min_on_s) ? on_for_s : mpc_par.rule_min_on_s;
     }
     return command;
 }

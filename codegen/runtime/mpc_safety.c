@@ -1,7 +1,9 @@
-/* Safety layer: makes any one-second command admissible, in closed form.
+/* Safety layer: the command of one second that keeps the limits, else comes nearest to them.
  *
- * Whatever the optimiser returned, the result is finite and in range. In order of priority: power
- * limits of battery and engine; SOC limits; coolant limits.
+ * Whatever the optimiser returned, the result is finite and in range, and no other command exceeds
+ * the limits by less: first battery and engine power, then SOC, then coolant; where all are kept,
+ * in the same order the limits drawn in by a margin. Of such commands it takes the one nearest to
+ * the wish: the same on or off where possible, then the nearest power.
  */
 #include "mpc_constants.h"
 #include "mpc_heat.h"
@@ -9,59 +11,159 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-/* Largest engine power whose heat into the coolant is at most heat_w. */
-static mpc_real power_for_heat_w(mpc_real heat_w, mpc_real t_cl_degc)
+#define LIMITS 3
+#define NEVER_W REAL(1.0e9)
+
+/* Engine powers, W, that keep one pair of limits. */
+typedef struct {
+    mpc_real low;
+    mpc_real high;
+} interval;
+
+/* Heat of the running engine: (1 - x) (LHV (alpha f(P) + start) - P). */
+typedef struct {
+    mpc_real share;
+    mpc_real factor;
+    mpc_real start_w;
+} engine_heat;
+
+static mpc_real distance(interval of, mpc_real value)
 {
-    const mpc_real factor = mpc_map_cold_factor(t_cl_degc) * mpc_par.lhv_j_per_g;
-    const mpc_real share = REAL(1.0) - mpc_par.exhaust_share;
-    mpc_real low = REAL(0.0);
-    mpc_real high = mpc_par.engine_max_w;
-    for (int32_t i = 0; i < BISECTIONS; i++) {
-        const mpc_real middle = REAL(0.5) * (low + high);
-        const mpc_real heat = share * ((factor * mpc_map_fuel_g_per_s(middle)) - middle);
-        const int32_t cool = (heat <= heat_w) ? 1 : 0;
-        low = (cool != 0) ? middle : low;
-        high = (cool != 0) ? high : middle;
-    }
-    return low;
+    return real_max(real_max(of.low - value, value - of.high), REAL(0.0));
 }
 
-/* Engine power that just warms the coolant to its upper limit within the second. */
-static mpc_real cooling_limit_w(const mpc_measured *seen)
+/* The part of `own` inside `to`; if there is none, its nearest point. */
+static interval narrowed(interval own, interval to)
 {
-    const mpc_real room_k = mpc_par.t_cl_max_degc - T_CL_MARGIN_K - seen->t_cl_degc;
+    const interval both = {real_min(real_max(own.low, to.low), own.high),
+                           real_max(real_min(own.high, to.high), own.low)};
+    return both;
+}
+
+/* Brakes take braking power that the battery cannot: it then has to take P_eng - P_aux at most. */
+static interval of_battery(const mpc_measured *seen, mpc_real margin)
+{
+    const mpc_real net_w = seen->demand_w + mpc_par.aux_power_w;
+    const mpc_real drawn_w = margin * POWER_MARGIN_W;
+    const interval allowed = {(net_w - mpc_par.battery_discharge_max_w) + drawn_w,
+                              (real_max(net_w, mpc_par.aux_power_w) + mpc_par.battery_charge_max_w)
+                                  - drawn_w};
+    return allowed;
+}
+
+static interval of_soc(const mpc_measured *seen, mpc_real margin)
+{
+    const mpc_real net_w = seen->demand_w + mpc_par.aux_power_w;
+    const mpc_real drawn = margin * SOC_MARGIN;
+    const mpc_real emptying_w =
+        real_max(mpc_map_power_to_reach_w(seen->soc, mpc_par.soc_min + drawn),
+                 -mpc_par.battery_charge_max_w); /* far below: as fast as can be */
+    const mpc_real filling_w = mpc_map_power_to_reach_w(seen->soc, mpc_par.soc_max - drawn);
+    interval allowed;
+    if (filling_w <= REAL(0.0)) {
+        allowed.high = real_max(net_w, mpc_par.aux_power_w) - filling_w;
+    } else { /* too full: to be discharged by the demand; while braking, not to be charged */
+        allowed.high = (net_w > REAL(0.0)) ? (net_w - filling_w) : mpc_par.aux_power_w;
+    }
+    allowed.low = real_min(net_w - emptying_w, allowed.high);
+    return allowed;
+}
+
+static mpc_real heat_at(const engine_heat *heat, int32_t i)
+{
+    return heat->start_w
+           + (heat->share
+              * ((heat->factor * mpc_par.fuel_g_per_s[i]) - ((mpc_real)i * mpc_par.fuel_step_w)));
+}
+
+/* Engine power that gives this heat; heat grows with power. Always the same number of steps. */
+static mpc_real power_for_heat_w(const engine_heat *heat, mpc_real heat_w)
+{
+    int32_t below = 0; /* the last point with no more heat */
+    for (int32_t stride = MPC_FUEL_STRIDE; stride > 0; stride /= 2) {
+        const int32_t i = below + stride;
+        if ((i < (MPC_FUEL_POINTS - 1)) && (heat_at(heat, i) <= heat_w)) {
+            below = i;
+        }
+    }
+    const mpc_real least = heat_at(heat, below);
+    const mpc_real step = heat_at(heat, below + 1) - least;
+    const mpc_real power_w = mpc_par.fuel_step_w * ((mpc_real)below + ((heat_w - least) / step));
+    mpc_real result = power_w;
+    if (heat_w < least) {
+        result = -NEVER_W;
+    } else if (power_w > mpc_par.engine_max_w) {
+        result = NEVER_W;
+    } else {
+        /* there is one */
+    }
+    return result;
+}
+
+/* Heat of the engine after which the coolant lies in its limits. */
+static interval of_heat(const mpc_measured *seen, mpc_real margin)
+{
     const mpc_real out_w = heat_cooling_w(seen->t_cl_degc, seen->speed_mps);
-    /* always computed, so that every step takes the same time */
-    const mpc_real limit_w =
-        power_for_heat_w(out_w + (room_k * mpc_par.heat_capacity_j_per_k), seen->t_cl_degc);
-    return (room_k > T_CL_NEAR_K) ? mpc_par.engine_max_w : limit_w;
+    const mpc_real drawn_k = margin * T_CL_MARGIN_K;
+    const mpc_real low_k = (mpc_par.t_cl_min_degc - seen->t_cl_degc) + drawn_k;
+    const mpc_real high_k = (mpc_par.t_cl_max_degc - seen->t_cl_degc) - drawn_k;
+    const interval allowed = {out_w + (low_k * mpc_par.heat_capacity_j_per_k),
+                              out_w + (high_k * mpc_par.heat_capacity_j_per_k)};
+    return allowed;
+}
+
+/* Whether on or off exceeds the limits by less, in order of priority; the wish if neither. */
+static int32_t better(int32_t wish, const mpc_real *on, const mpc_real *off)
+{
+    int32_t choice = wish;
+    for (int32_t i = (2 * LIMITS) - 1; i >= 0; i--) {
+        if (on[i] < off[i]) {
+            choice = 1;
+        } else if (off[i] < on[i]) {
+            choice = 0;
+        } else {
+            /* the lower priorities decide */
+        }
+    }
+    return choice;
 }
 
 mpc_command mpc_safety_admissible(mpc_command wish, const mpc_measured *seen)
 {
-    const mpc_real net_w = seen->demand_w + mpc_par.aux_power_w;
-    const mpc_real give_w = mpc_map_discharge_limit_w(seen->soc - SOC_MARGIN);
-    /* below `low` the battery gives too much, above `high` it takes too much */
-    const mpc_real low = real_max(net_w - give_w, REAL(0.0));
-    const mpc_real high = real_min(net_w + mpc_map_charge_limit_w(seen->soc), mpc_par.engine_max_w);
-    const mpc_real coolest_w = cooling_limit_w(seen);
-    int32_t on = wish.engine_on;
-    mpc_real p_eng_w = (wish.p_eng_w >= REAL(0.0)) ? wish.p_eng_w : REAL(0.0); /* not NaN either */
-    if ((on == 0) && (seen->t_cl_degc < (mpc_par.t_cl_min_degc + T_CL_COOLING_K))) {
-        on = 1;
-        p_eng_w = mpc_par.rule_heat_power_w;
-    }
-    if (on != 0) {
-        p_eng_w = real_min(p_eng_w, coolest_w);
-    }
-    if (low > REAL(0.0)) {
-        on = 1;
+    const mpc_real share = REAL(1.0) - mpc_par.exhaust_share;
+    const mpc_real start_g = (seen->engine_on != 0) ? REAL(0.0) : mpc_par.start_fuel_g;
+    const engine_heat heat = {share, mpc_map_cold_factor(seen->t_cl_degc) * mpc_par.lhv_j_per_g,
+                              share * mpc_par.lhv_j_per_g * start_g};
+    interval running = {mpc_par.engine_min_w, mpc_par.engine_max_w};
+    mpc_real on[2 * LIMITS];
+    mpc_real off[2 * LIMITS];
+    for (int32_t tier = 0; tier < 2; tier++) {
+        const mpc_real margin = (mpc_real)tier;
+        const interval powers[LIMITS - 1] = {of_battery(seen, margin), of_soc(seen, margin)};
+        const int32_t first = tier * LIMITS;
+        for (int32_t i = 0; i < (LIMITS - 1); i++) {
+            running = narrowed(running, powers[i]);
+            on[first + i] = distance(powers[i], running.low);
+            off[first + i] = distance(powers[i], REAL(0.0));
+        }
+        const interval warmth = of_heat(seen, margin);
+        const interval by_heat = {power_for_heat_w(&heat, warmth.low),
+                                  power_for_heat_w(&heat, warmth.high)};
+        running = narrowed(running, by_heat);
+        const mpc_real fuel = mpc_map_fuel_g_per_s(running.low);
+        const mpc_real made_w = heat.start_w + (share * ((heat.factor * fuel) - running.low));
+        /* within what the inverse resolves, it is kept */
+        const int32_t kept = ((by_heat.low <= running.low) && (running.low <= by_heat.high)) ? 1
+                                                                                             : 0;
+        on[first + LIMITS - 1] = (kept != 0) ? REAL(0.0) : distance(warmth, made_w);
+        off[first + LIMITS - 1] = distance(warmth, REAL(0.0));
     }
     mpc_command command = {REAL(0.0), 0};
-    /* braking at the charge limit leaves no room for the engine: it must be off */
-    if ((on != 0) && (high >= mpc_par.engine_min_w)) {
-        command.engine_on = 1;
-        command.p_eng_w = real_min(real_max(real_max(p_eng_w, low), mpc_par.engine_min_w), high);
+    if (better(wish.engine_on, on, off) != 0) {
+        const int32_t wanted = ((wish.engine_on != 0) && (wish.p_eng_w >= REAL(0.0))) ? 1 : 0;
+        command.engine_on = 1; /* at the power wished for; a NaN is none */
+        command.p_eng_w =
+            real_clip((wanted != 0) ? wish.p_eng_w : REAL(0.0), running.low, running.high);
     }
     return command;
 }

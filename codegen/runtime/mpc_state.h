@@ -47,9 +47,31 @@ typedef struct {
     mpc_real t_cl_degc;
     mpc_real demand_w;
     mpc_real speed_mps;
+    int32_t engine_on;
 } mpc_measured;
 
+/* Memory of the checks of measurements. */
 typedef struct {
+    mpc_measured good;
+    mpc_real command_w; /* last command */
+    int32_t command_on;
+    int32_t soc_since_s; /* since the last good measurement */
+    int32_t t_cl_since_s;
+    int32_t clock; /* `second` of the last call */
+    int32_t has_clock;
+} mpc_watch;
+
+/* The last preview received that the car could drive, to compare the next one with. */
+typedef struct {
+    mpc_real short_demand_w[MPC_SHORT];
+    mpc_real long_duration_s[MPC_LONG];
+    mpc_real long_net_w[MPC_LONG];
+    mpc_real long_internal_off_w[MPC_LONG];
+    int32_t age; /* seconds since then; MPC_NO_PLAN if there is none */
+} mpc_heard;
+
+typedef struct {
+    uint32_t magic; /* tells an initialised state from any other memory, as does magic_end */
     mpc_stage stage[MPC_STAGES];
     mpc_stage_iterate kept[MPC_STAGES]; /* to go back to if the solve fails */
     /* Origin of SOC and coolant temperature: the state at the start of the horizon. Small numbers
@@ -59,15 +81,18 @@ typedef struct {
     mpc_real cost;                    /* of the solver, in units per g */
     mpc_real old_on_share[MPC_SHORT]; /* last usable plan */
     mpc_real old_p_eng_w[MPC_SHORT];
-    int32_t old_age; /* steps since then; MPC_NO_PLAN if there is none */
+    int32_t old_age;  /* steps since then; MPC_NO_PLAN if there is none */
+    int32_t road_age; /* seconds since the last good preview; MPC_NO_PLAN if there is none */
     int32_t phase;
     int32_t failures;             /* of the solver, in a row */
     int32_t solves;               /* since the last cold start, up to MPC_WARM_UP_STEPS */
     int32_t is_under_way;         /* the first step has been made */
     int32_t depart_linearisation; /* done of the departure */
     int32_t depart_left;          /* iterations left of the current linearisation */
-    mpc_measured good;
+    mpc_watch watch;
+    mpc_heard heard;
     mpc_rule_memory rules;
+    uint32_t magic_end;
 } mpc_state;
 
 enum {
@@ -76,5 +101,6 @@ enum {
     MPC_PHASE_RUNNING = 2    /* iterate of a finished solve, in SI units */
 };
 #define MPC_NO_PLAN 1000000
+#define MPC_MAGIC 0x51504D43u
 
 #endif

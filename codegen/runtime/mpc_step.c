@@ -12,25 +12,31 @@ void mpc_init(mpc_state *state)
     for (size_t i = 0U; i < sizeof(mpc_state); i++) {
         byte[i] = 0U;
     }
+    state->magic = MPC_MAGIC;
+    state->magic_end = MPC_MAGIC;
     state->old_age = MPC_NO_PLAN;
+    state->road_age = MPC_NO_PLAN;
+    state->heard.age = MPC_NO_PLAN;
     state->phase = MPC_PHASE_COLD;
-    state->good.soc = mpc_par.soc_init;
-    state->good.t_cl_degc = mpc_par.t_cl_init_degc;
+    state->watch.good.soc = mpc_par.soc_init;
+    state->watch.good.t_cl_degc = mpc_par.t_cl_init_degc;
+    state->watch.soc_since_s = LONG_AGO_S;
+    state->watch.t_cl_since_s = LONG_AGO_S;
     mpc_solver_claim(state);
 }
 
 /* Make the values of this second and start at the last solution, or from cold. */
-static void prepare(mpc_state *state, const mpc_in *in)
+static void prepare(mpc_state *state)
 {
+    const mpc_measured *const good = &state->watch.good;
     if (state->phase == MPC_PHASE_COLD) {
         mpc_iterate_clear(state);
-        mpc_qp_move_origin(state, state->good.soc, state->good.t_cl_degc);
+        mpc_qp_move_origin(state, good->soc, good->t_cl_degc);
         mpc_qp_linearise_cold(state);
     } else {
-        mpc_qp_move_origin(state, state->good.soc, state->good.t_cl_degc);
+        mpc_qp_move_origin(state, good->soc, good->t_cl_degc);
         mpc_qp_linearise_about_plan(state);
     }
-    mpc_qp_road(state, in);
     mpc_qp_update(state);
     mpc_iterate_keep(state);
     mpc_iterate_to_solver_units(state);
@@ -59,7 +65,9 @@ static void depart_slice(mpc_state *state, const mpc_in *in)
 {
     int32_t count = MPC_ITERATIONS;
     if (state->phase != MPC_PHASE_DEPARTING) {
-        prepare(state, in);
+        mpc_qp_road(state, in);
+        state->road_age = 0;
+        prepare(state);
         state->phase = MPC_PHASE_DEPARTING;
         state->depart_left = MPC_DEPARTURE_ITERATIONS;
         count = ((MPC_DEPARTURE_ITERATIONS - 1) % MPC_ITERATIONS) + 1;
@@ -74,46 +82,86 @@ static void depart_slice(mpc_state *state, const mpc_in *in)
     }
 }
 
+/* The measurements of a departure, each on its own: the trip has not begun. */
+static int32_t measured_before_departure(mpc_state *state, const mpc_in *in)
+{
+    int32_t elapsed = 0;
+    const int32_t flags = mpc_check_measured(&state->watch, in, &elapsed);
+    state->watch.has_clock = 0;
+    state->watch.soc_since_s = LONG_AGO_S;
+    state->watch.t_cl_since_s = LONG_AGO_S;
+    return (flags == 0) ? 1 : 0;
+}
+
 int32_t mpc_depart(mpc_state *state, const mpc_in *in)
 {
     int32_t result = -1;
-    if ((mpc_check_measured(&state->good, in) & mpc_check_preview(in)) != 0) {
+    if (mpc_check_state(state) == 0) {
+        /* not initialised */
+    } else if (state->is_under_way != 0) {
+        result = 0;
+    } else if ((measured_before_departure(state, in) & mpc_preview_first(&state->heard, in)) != 0) {
         if (state->depart_linearisation < MPC_DEPARTURE_LINEARISATIONS) {
             depart_slice(state, in);
         }
         result = 1;
         if (state->depart_linearisation >= MPC_DEPARTURE_LINEARISATIONS) {
             result = 0;
-            if ((state->phase == MPC_PHASE_RUNNING) && (state->is_under_way == 0)) {
+            if (state->phase == MPC_PHASE_RUNNING) {
                 state->solves = MPC_WARM_UP_STEPS;
             }
         }
+    } else {
+        /* bad input */
     }
     return result;
 }
 
 /* Prepare the last solution for the start of another second. */
-static void move_on(mpc_state *state)
+static void move_on(mpc_state *state, int32_t passed)
 {
     if (state->phase == MPC_PHASE_DEPARTING) {
         (void)conclude(state, 1); /* a departure cut short is a warm start like any other */
     }
-    mpc_iterate_shift(state, state->is_under_way);
-    if (state->old_age < MPC_NO_PLAN) {
-        state->old_age++;
-    }
+    mpc_iterate_shift(state, passed);
+    const int32_t old_age = state->old_age + passed;
+    state->old_age = (old_age < MPC_NO_PLAN) ? old_age : MPC_NO_PLAN;
     state->is_under_way = 1;
     state->depart_linearisation = MPC_DEPARTURE_LINEARISATIONS;
 }
 
+/* Take the preview of this second, or the last good one, moved up; returns whether there is one. */
+static int32_t take_preview(mpc_state *state, const mpc_in *in, int32_t passed, int32_t *flags)
+{
+    if (mpc_preview_check(&state->heard, in, passed) != 0) {
+        mpc_qp_road(state, in);
+        state->road_age = 0;
+    } else {
+        *flags |= MPC_BAD_PREVIEW;
+        if ((state->road_age + passed) < MPC_SHORT) {
+            mpc_qp_road_move_up(state, passed);
+            state->road_age += passed;
+        } else {
+            state->road_age = MPC_NO_PLAN;
+        }
+    }
+    return (state->road_age < MPC_SHORT) ? 1 : 0;
+}
+
+/* Only for the injection of faults: a build may say that the solver fails. */
+#if !defined(MPC_SOLVER_MAY_SUCCEED)
+#define MPC_SOLVER_MAY_SUCCEED 1
+#endif
+
 /* One solve. After a failure the iterate that it started from is used again, if there was one;
  * after FAILURES_FORGIVEN more in a row it may be the cause, and the solver starts cold. */
-static int32_t solve(mpc_state *state, const mpc_in *in)
+static int32_t solve(mpc_state *state)
 {
     const int32_t phase = state->phase;
     const int32_t solves = state->solves;
-    prepare(state, in);
-    const int32_t usable = conclude(state, mpc_solver_iterate(state, MPC_ITERATIONS));
+    prepare(state);
+    const int32_t usable =
+        conclude(state, mpc_solver_iterate(state, MPC_ITERATIONS) & MPC_SOLVER_MAY_SUCCEED);
     if (usable != 0) {
         state->failures = 0;
     } else {
@@ -151,32 +199,38 @@ static mpc_command realise(const mpc_state *state)
 int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out)
 {
     static const mpc_out nothing = {REAL(0.0), REAL(0.0), REAL(0.0), 0, MPC_RULES, 0, 0};
+    int32_t elapsed = 1;
     *out = nothing;
-    if (mpc_check_measured(&state->good, in) == 0) {
-        out->flags |= MPC_BAD_MEASUREMENT;
+    if (mpc_check_state(state) == 0) {
+        mpc_init(state);
+        out->flags = MPC_BAD_STATE;
     }
-    if (mpc_check_preview(in) == 0) {
-        out->flags |= MPC_BAD_PREVIEW;
-    }
+    mpc_watch *const watch = &state->watch;
+    out->flags |= mpc_check_measured(watch, in, &elapsed);
     /* the rules are evaluated every second, so that their memory is right if they take over */
-    mpc_command command = mpc_rules_decide(&state->rules, &state->good);
-    move_on(state);
-    if (out->flags == 0) {
+    mpc_command command = mpc_rules_decide(&state->rules, &watch->good, elapsed);
+    const int32_t passed = (state->is_under_way != 0) ? elapsed : 0;
+    move_on(state, passed);
+    int32_t is_new = 0;
+    if (take_preview(state, in, passed, &out->flags) != 0) {
         out->iterations = MPC_ITERATIONS;
-        if (solve(state, in) == 0) {
+        if (solve(state) == 0) {
             out->flags |= MPC_SOLVER_FAILED;
         } else if (state->solves < MPC_WARM_UP_STEPS) {
             out->flags |= MPC_WARMING_UP;
         } else {
+            is_new = 1;
             keep_plan(state);
             out->on_share = state->stage[0].x[MPC_VAR_ON];
             out->relaxation_gap = mpc_qp_relaxation_gap(&state->stage[0]);
         }
     }
     if ((state->old_age <= MPC_PLAN_VALID_STEPS) && (state->old_age < MPC_SHORT)) {
-        out->rung = (state->old_age == 0) ? MPC_OPTIMISED : MPC_SHIFTED_PLAN;
-        command = mpc_safety_admissible(realise(state), &state->good);
+        out->rung = (is_new != 0) ? MPC_OPTIMISED : MPC_SHIFTED_PLAN;
+        command = mpc_safety_admissible(realise(state), &watch->good);
     }
+    watch->command_on = command.engine_on;
+    watch->command_w = command.p_eng_w;
     out->engine_on = command.engine_on;
     out->p_eng_w = command.p_eng_w;
     return out->flags;

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import BaseModel
 
+from qpmpc.controllers.monitor import NOTHING_WRONG, Flag, InputMonitor
 from qpmpc.controllers.safety import SafetyLayer
 from qpmpc.controllers.settings import SettingsLike, as_settings
 from qpmpc.errors import InputError, QpmpcError
@@ -23,7 +24,8 @@ class Decision(NamedTuple):
     """A command and its origin.
 
     `fallback` names the rung of the degradation ladder that was used, empty if none.
-    `relaxation_gap` and `on_share` are nan for controllers without a relaxation.
+    `relaxation_gap` and `on_share` are nan for controllers without a relaxation. `flags` says what
+    was wrong in this second.
     """
 
     command: Command
@@ -31,6 +33,7 @@ class Decision(NamedTuple):
     iterations: int = 0
     relaxation_gap: float = float("nan")
     on_share: float = float("nan")
+    flags: Flag = NOTHING_WRONG
 
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
@@ -102,8 +105,9 @@ class Driver:
 class Controller(Driver, ABC):
     """A causal controller; one instance belongs to one trip and drives it once.
 
-    A subclass implements `step` and, if it has a memory or needs preparation, `depart`. Whatever
-    `step` returns, the safety layer makes the command admissible.
+    A subclass implements `step` and, if it has a memory or needs preparation, `depart`. `step` gets
+    plausible measurements only (`InputMonitor`), and whatever it returns, the safety layer makes
+    the command admissible.
 
     Parameters
     ----------
@@ -118,6 +122,8 @@ class Controller(Driver, ABC):
     implementation: str = "python"
     # true if the commands are already admissible, or must be applied unchanged
     has_safety_layer: ClassVar[bool] = False
+    # true if it checks its measurements itself, or needs none
+    has_monitor: ClassVar[bool] = False
     # whether it decides from second to second, so that step times are meaningful
     decides_online: ClassVar[bool] = True
     _under_way: bool | None = None  # None as long as __init__ has not run
@@ -126,7 +132,8 @@ class Controller(Driver, ABC):
         super().__init__(trip, settings)
         self.remarks: list[str] = []
         self._lasting_remarks: list[str] = []
-        self.safety = SafetyLayer(trip.plant, self.settings.rule_based.heat_power_w)
+        self.safety = SafetyLayer(trip.plant)
+        self.monitor = InputMonitor(trip.plant)
         self._under_way = False
 
     def depart(self, progress: Progress | None = None) -> None:
@@ -144,15 +151,20 @@ class Controller(Driver, ABC):
         """Choose the engine command of the coming second."""
 
     def decide(self, seen: Observation) -> Decision:
-        """Run one second: `step`, then the safety layer."""
+        """Run one second: check the measurements, `step`, then the safety layer."""
         if self._under_way is None:
             raise base_not_called(self)
         if not self._under_way:
             self.begin(self.trip)
+        flags = NOTHING_WRONG
+        if not self.has_monitor:
+            seen, flags = self.monitor.checked(seen)
         decision = _decision_of(self.step(seen), self, seen.step)
-        if self.has_safety_layer:
-            return decision
-        return decision._replace(command=self.safety.admissible(decision.command, seen))
+        decision = decision._replace(flags=decision.flags | flags)
+        if not self.has_safety_layer:
+            decision = decision._replace(command=self.safety.admissible(decision.command, seen))
+        self.monitor.commanded(decision.command)
+        return decision
 
     def begin(self, trip: Trip, progress: Progress | None = None) -> None:
         """Start a run.
@@ -165,7 +177,12 @@ class Controller(Driver, ABC):
         self.check_ready(trip)
         self._under_way = True
         self._lasting_remarks = list(self.remarks)
+        self.monitor.forget()
         self.depart(progress)
+
+    def forget(self) -> None:
+        """Forget what a restart of the ECU under way would lose: here, the measurements."""
+        self.monitor.forget()
 
     def check_ready(self, trip: Trip) -> None:
         """Check that the controller can start a run of this trip.

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from qpmpc.controllers.monitor import Flag
 from qpmpc.controllers.receding_horizon import Plan, Planner, power_while_on_w
 from qpmpc.controllers.settings import MhQpSettings, SettingsLike
 from qpmpc.errors import InputError
@@ -146,8 +147,10 @@ class QpPlanner(Planner):
         """Spend one step's iterations on the QP of this second."""
         solved = self.solve(seen)
         iterations = solved.solution.iterations
-        if not (solved.solution.usable and self.ready):
+        if not solved.solution.usable:
             return Plan.none(iterations=iterations)
+        if not self.ready:
+            return Plan.none(iterations=iterations, flags=Flag.WARMING_UP)
         short = slice(self.of_qp.horizon.short_stages)
         on_share = solved.x[short, Var.ON]
         power_w = power_while_on_w(on_share, solved.x[short, Var.P_ENG])
@@ -176,11 +179,15 @@ class QpPlanner(Planner):
         elif self._failures < FAILURES_FORGIVEN:
             self._failures += 1
         else:
-            self.forget()
+            self._start_cold()
         return plan
 
     def forget(self) -> None:
-        """Forget the last solution, as after a restart of the controller under way."""
+        """Forget solution and preview, as after a restart of the controller under way."""
+        self.preview.forget()
+        self._start_cold()
+
+    def _start_cold(self) -> None:
         self.last, self._solves, self._failures = None, 0, 0
 
     def _about(self, x: Floats, t_cl_degc: float) -> Linearisation:

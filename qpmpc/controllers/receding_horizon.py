@@ -1,15 +1,18 @@
 """The receding-horizon loop: plan, realise on/off, keep safe, degrade in steps. Written once."""
 
 from abc import ABC, abstractmethod
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpmpc.controllers.base import Controller, Decision, Driver, Progress, base_not_called
+from qpmpc.controllers.monitor import NOTHING_WRONG, Flag
 from qpmpc.controllers.rule_based import RuleBased
 from qpmpc.controllers.settings import SettingsLike
 from qpmpc.errors import QpmpcError
+from qpmpc.preview.checked import CheckedPreview, NoPreviewError
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.plant import Command
 
@@ -27,6 +30,7 @@ class Plan:
     power_on_w : engine power while it is on, shape (n,)
     usable : whether it may be applied
     reason : why not, in a few words
+    flags : why not, in the terms of the ladder
     iterations : taken by the solver
     relaxation_gap : slack of the relaxation at the first second, relative; nan if there is none
     """
@@ -37,6 +41,7 @@ class Plan:
     iterations: int = 0
     relaxation_gap: float = float("nan")
     reason: str = ""
+    flags: Flag = NOTHING_WRONG
 
     @classmethod
     def of_means(cls, on_share: ArrayLike, p_eng_w: ArrayLike) -> "Plan":
@@ -45,10 +50,11 @@ class Plan:
         return cls(share, power_while_on_w(share, mean_w))
 
     @classmethod
-    def none(cls, reason: str = "", iterations: int = 0) -> "Plan":
+    def none(
+        cls, reason: str = "", iterations: int = 0, flags: Flag = Flag.SOLVER_FAILED
+    ) -> "Plan":
         """Return the result of a planner that has found no plan, and why."""
-        nothing = np.empty(0)
-        return cls(nothing, nothing, usable=False, iterations=iterations, reason=reason)
+        return cls(np.empty(0), np.empty(0), False, iterations, reason=reason, flags=flags)
 
 
 def power_while_on_w(
@@ -124,22 +130,35 @@ class RecedingHorizon(Controller):
 
     def depart(self, progress: Progress | None = None) -> None:
         """Prepare the planner's first plan."""
-        self._rules.reset()
+        self._rules.depart()
         self._old, self._has_reason = None, False
-        self.planner.depart(self.trip.start)
+        with suppress(NoPreviewError):  # then it starts from cold, under way
+            self.planner.depart(self.trip.start)
 
     def step(self, seen: Observation) -> Decision:
         """Run one step: the plan, else the shifted last plan, else the rules."""
-        ruled = self._rules.decide(seen)
-        plan = self._checked(self.planner.plan(seen), seen.step)
+        ruled = self._rules.step(seen)
+        plan = self._plan(seen)
+        flags = plan.flags
+        preview = getattr(self.planner, "preview", None)
+        if isinstance(preview, CheckedPreview) and preview.was_bad:
+            flags |= Flag.BAD_PREVIEW
         if plan.usable:
             self._old, self._old_step = plan, seen.step
-            on_share = float(plan.on_share[0])
-            return Decision(_at(plan, 0), "", plan.iterations, plan.relaxation_gap, on_share)
+            gap, on_share = plan.relaxation_gap, float(plan.on_share[0])
+            return Decision(_at(plan, 0), "", plan.iterations, gap, on_share, flags)
+        command, rung = ruled, "rule-based"
         age = seen.step - self._old_step
         if self._old is not None and age < min(PLAN_VALID_STEPS + 1, len(self._old.on_share)):
-            return Decision(_at(self._old, age), "shifted plan", plan.iterations)
-        return Decision(ruled.command, "rule-based", plan.iterations)
+            command, rung = _at(self._old, age), "shifted plan"
+        return Decision(command, rung, plan.iterations, flags=flags)
+
+    def _plan(self, seen: Observation) -> Plan:
+        """Plan of this second; none where there is no preview."""
+        try:
+            return self._checked(self.planner.plan(seen), seen.step)
+        except NoPreviewError:
+            return Plan.none(flags=Flag.BAD_PREVIEW)
 
     def _checked(self, plan: Plan, second: int) -> Plan:
         """Refuse what is no plan; take one that is not finite as unusable."""
@@ -163,8 +182,10 @@ class RecedingHorizon(Controller):
         return plan
 
     def forget(self) -> None:
-        """Forget plan and warm start, as after a restart of the ECU under way."""
+        """Forget measurements, plan, warm start and the rules' memory, as after a restart."""
+        super().forget()
         self.planner.forget()
+        self._rules.depart()
         self._old = None
 
 

@@ -11,7 +11,7 @@ from qpmpc.vehicle.plant import Command
 class Replay(Controller):
     """Plans all commands of a trip at departure and replays them whatever the plant does."""
 
-    has_safety_layer = True  # a plan made with the plant itself is applied unchanged
+    has_monitor = has_safety_layer = True  # a plan made with the plant itself is applied unchanged
     decides_online = False
     _commands: Sequence[Command] = ()
 

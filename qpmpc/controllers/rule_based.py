@@ -29,11 +29,18 @@ class RuleBased(Controller):
         self._power_request = False
         self._heat_request = False
         self._on_for_s = 0
+        self._last_step: int | None = None
 
     def depart(self, progress: Progress | None = None) -> None:
         """Reset the rules."""
         self._power_request = self._heat_request = False
         self._on_for_s = 0
+        self._last_step = None
+
+    def forget(self) -> None:
+        """Forget measurements and timers, as after a restart of the ECU under way."""
+        super().forget()
+        self.depart()
 
     def step(self, seen: Observation) -> Command:
         """Apply the rules, then the safety layer."""
@@ -57,5 +64,7 @@ class RuleBased(Controller):
         elif self._heat_request or 0 < self._on_for_s < s.min_on_s:
             wish = Command(True, s.heat_power_w)
         command = self.safety.admissible(wish, seen)
-        self._on_for_s = self._on_for_s + 1 if command.engine_on else 0
+        elapsed = 1 if self._last_step is None else seen.step - self._last_step
+        self._last_step = seen.step
+        self._on_for_s = self._on_for_s + elapsed if command.engine_on else 0
         return command

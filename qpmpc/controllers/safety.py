@@ -1,83 +1,155 @@
-"""Safety layer: makes any one-step command admissible, in closed form."""
+"""Safety layer: the command of one second that keeps the limits, else comes nearest to them.
+
+Statement, assumptions and proof: docs/safety.md. The same in C: codegen/runtime/mpc_safety.c.
+"""
+
+from bisect import bisect_right
+from math import inf
+from typing import NamedTuple
 
 from qpmpc.trip import Observation
 from qpmpc.vehicle.engine import alpha_at
 from qpmpc.vehicle.heat import cooling_w
 from qpmpc.vehicle.plant import Command, Plant
 
-SOC_MARGIN = 1e-5  # kept from the lower limit; the result of a step is known exactly there
-T_CL_MARGIN_K = 0.02  # kept from the upper limit; the result of a step is known exactly there
-T_CL_COOLING_K = 0.15  # a step with the engine off cools the coolant by less than this
-T_CL_NEAR_K = 2.0  # no step warms the coolant by more than this
-BISECTIONS = 20  # of the engine power range: to some 0.05 W
+# Kept from the limits where that is possible: rounding, in single precision too, stays inside.
+POWER_MARGIN_W = 0.1
+SOC_MARGIN = 1e-5
+T_CL_MARGIN_K = 0.02
+
+
+class Interval(NamedTuple):
+    """Engine powers, W, that keep one pair of limits."""
+
+    low_w: float
+    high_w: float
+
+    def distance_w(self, p_eng_w: float) -> float:
+        """Distance of a power from the interval; 0 inside."""
+        return max(self.low_w - p_eng_w, p_eng_w - self.high_w, 0.0)
+
+    def narrowed(self, to: "Interval") -> "Interval":
+        """Part of the interval inside another; if there is none, its nearest point."""
+        return Interval(
+            min(max(self.low_w, to.low_w), self.high_w),
+            max(min(self.high_w, to.high_w), self.low_w),
+        )
 
 
 class SafetyLayer:
     """Corrects a command so that the next second keeps power, SOC and coolant limits.
 
-    Whatever the optimiser returned, the result is finite and in range. In order of priority:
-    battery and engine power limits; SOC limits; coolant limits.
+    Whatever the optimiser returned, the result is finite and in range, and no other command
+    exceeds the limits by less: first battery and engine power, then SOC, then coolant; where all
+    are kept, in the same order the limits drawn in by a margin. Of such commands it takes the one
+    nearest to the wish: the same on or off where possible, then the nearest power.
 
     Parameters
     ----------
     plant : gives limits and one-step heat flows; its state is never touched
-    heat_power_w : engine power when it runs for heat alone
     """
 
-    def __init__(self, plant: Plant, heat_power_w: float = 4000.0) -> None:
+    def __init__(self, plant: Plant) -> None:
         self._plant = plant
         self._vehicle = plant.vehicle
-        self._heat_power_w = heat_power_w
+        self._fuel_g_per_s: list[float] = plant.line.fuel_g_per_s.tolist()
+        self._power_w: list[float] = plant.line.power_w.tolist()
 
     def admissible(self, wish: Command, seen: Observation) -> Command:
         """Return the admissible command nearest to `wish`."""
-        battery, engine = self._vehicle.battery, self._vehicle.engine
-        net_w = seen.demand_w + battery.aux_power_w
-        least, most = self._battery_range_w(seen.soc)
-        low = max(net_w - most, 0.0)  # engine power without which the battery gives too much
-        high = min(net_w - least, engine.power_max_w)
-        on, p_eng = wish.engine_on, wish.p_eng_w
-        if not p_eng >= 0.0:  # negative or nan
-            p_eng = 0.0
-        if self._too_cold(seen) and not on:
-            on, p_eng = True, self._heat_power_w
-        if on:
-            p_eng = min(p_eng, self._cooling_limit_w(seen))
-        if low > 0.0:
-            on = True
-        if not on or high < engine.power_min_w:
-            # Braking at the charge limit leaves no room for the engine: it must be off.
+        engine = self._vehicle.engine
+        heat = _EngineHeat(self, seen)
+        running = Interval(engine.power_min_w, engine.power_max_w)
+        on_excess: list[float] = []
+        off_excess: list[float] = []
+        for margin in (False, True):
+            for allowed in (self._battery_w(seen, margin), self._soc_w(seen, margin)):
+                running = running.narrowed(allowed)
+                on_excess.append(allowed.distance_w(running.low_w))
+                off_excess.append(allowed.distance_w(0.0))
+            allowed_heat = self._heat_w(seen, margin)
+            by_heat = Interval(*map(heat.power_w, allowed_heat))
+            running = running.narrowed(by_heat)
+            kept = by_heat.low_w <= running.low_w <= by_heat.high_w  # whatever rounding leaves
+            on_excess.append(0.0 if kept else allowed_heat.distance_w(heat.of(running.low_w)))
+            off_excess.append(allowed_heat.distance_w(0.0))
+        on = bool(wish.engine_on) if on_excess == off_excess else on_excess < off_excess
+        if not on:
             return Command(False, 0.0)
-        return Command(True, min(max(p_eng, low, engine.power_min_w), high))
+        wanted_w = wish.p_eng_w if wish.engine_on and wish.p_eng_w >= 0.0 else 0.0  # nor nan
+        return Command(True, min(max(wanted_w, running.low_w), running.high_w))
 
-    def _battery_range_w(self, soc: float) -> tuple[float, float]:
-        """Terminal power that the battery may take and give in the next second."""
-        battery, step_s = self._plant.battery, self._plant.step_s
-        most = battery.discharge_limit_w(soc - SOC_MARGIN, step_s)
-        return -battery.charge_limit_w(soc, step_s), most
+    def _battery_w(self, seen: Observation, margin: bool) -> Interval:
+        """Engine powers at which the battery's power stays in its limits.
 
-    def _too_cold(self, seen: Observation) -> bool:
-        """Whether a second with the engine off would reach the lower coolant limit."""
-        return seen.t_cl_degc < self._vehicle.thermal.t_cl_min_degc + T_CL_COOLING_K
+        Friction brakes take braking power that the battery cannot: while braking it has to take
+        no more than P_eng - P_aux.
+        """
+        battery = self._vehicle.battery
+        net_w, drawn_w = seen.demand_w + battery.aux_power_w, POWER_MARGIN_W * margin
+        return Interval(
+            net_w - battery.power_discharge_max_w + drawn_w,
+            max(net_w, battery.aux_power_w) + battery.power_charge_max_w - drawn_w,
+        )
 
-    def _cooling_limit_w(self, seen: Observation) -> float:
-        """Engine power that just warms the coolant to its upper limit within the step."""
-        plant, thermal = self._plant, self._vehicle.thermal
-        room_k = thermal.t_cl_max_degc - T_CL_MARGIN_K - seen.t_cl_degc
-        if room_k > T_CL_NEAR_K:
-            return self._vehicle.engine.power_max_w
+    def _soc_w(self, seen: Observation, margin: bool) -> Interval:
+        """Engine powers after which SOC lies in its limits."""
+        battery, maps, step_s = self._vehicle.battery, self._plant.battery, self._plant.step_s
+        net_w, aux_w = seen.demand_w + battery.aux_power_w, battery.aux_power_w
+        drawn = SOC_MARGIN * margin
+        emptying_w = maps.power_to_reach_w(seen.soc, battery.soc_min + drawn, step_s)
+        emptying_w = max(emptying_w, -battery.power_charge_max_w)  # far below: as fast as can be
+        filling_w = maps.power_to_reach_w(seen.soc, battery.soc_max - drawn, step_s)
+        if filling_w <= 0.0:
+            high_w = max(net_w, aux_w) - filling_w
+        else:  # too full: to be discharged by the demand; while braking, not to be charged
+            high_w = net_w - filling_w if net_w > 0.0 else aux_w
+        return Interval(min(net_w - emptying_w, high_w), high_w)
+
+    def _heat_w(self, seen: Observation, margin: bool) -> Interval:
+        """Heat of the engine after which the coolant lies in its limits."""
+        thermal = self._vehicle.thermal
         out_w = cooling_w(thermal, seen.t_cl_degc, seen.speed_mps)
-        storing_w = room_k * thermal.heat_capacity_j_per_k / plant.step_s
-        return self._power_for_heat_w(out_w + storing_w, seen.t_cl_degc)
+        w_per_k = thermal.heat_capacity_j_per_k / self._plant.step_s
+        drawn_k = T_CL_MARGIN_K * margin
+        low_k = thermal.t_cl_min_degc + drawn_k - seen.t_cl_degc
+        high_k = thermal.t_cl_max_degc - drawn_k - seen.t_cl_degc
+        return Interval(out_w + low_k * w_per_k, out_w + high_k * w_per_k)
 
-    def _power_for_heat_w(self, heat_w: float, t_cl_degc: float) -> float:
-        """Largest engine power whose heat into the coolant is at most `heat_w` (bisection)."""
-        low, high = 0.0, self._vehicle.engine.power_max_w
-        factor = alpha_at(self._vehicle.cold_engine, t_cl_degc)
-        factor *= self._vehicle.engine.lhv_j_per_g
-        share = 1.0 - self._vehicle.thermal.exhaust_share
-        for _ in range(BISECTIONS):
-            middle = 0.5 * (low + high)
-            heat = share * (factor * self._plant.line.fuel.at(middle) - middle)
-            low, high = (middle, high) if heat <= heat_w else (low, middle)
-        return low
+
+class _EngineHeat:
+    """Heat of the running engine into the coolant in one second, and its inverse.
+
+    Q(P) = (1 - x) [LHV (alpha f(P) + m_start / h) - P], increasing in P because fuel power grows
+    by more than shaft power.
+    """
+
+    def __init__(self, layer: SafetyLayer, seen: Observation) -> None:
+        vehicle, plant = layer._vehicle, layer._plant
+        engine = vehicle.engine
+        self._factor = alpha_at(vehicle.cold_engine, seen.t_cl_degc) * engine.lhv_j_per_g
+        self._share = 1.0 - vehicle.thermal.exhaust_share
+        starting_g_per_s = 0.0 if seen.engine_on else engine.start_fuel_g / plant.step_s
+        self._start_w = self._share * engine.lhv_j_per_g * starting_g_per_s
+        self._fuel, self._fuel_g_per_s = plant.line.fuel, layer._fuel_g_per_s
+        self._line_w = layer._power_w
+
+    def of(self, p_eng_w: float) -> float:
+        """Heat, W, at an engine power."""
+        fuel_w = self._factor * self._fuel.at(p_eng_w)
+        return self._start_w + self._share * (fuel_w - p_eng_w)
+
+    def _at(self, i: int) -> float:
+        fuel_w = self._factor * self._fuel_g_per_s[i]
+        return self._start_w + self._share * (fuel_w - self._line_w[i])
+
+    def power_w(self, heat_w: float) -> float:
+        """Engine power that gives this heat; infinite where none does."""
+        if heat_w < self._at(0):
+            return -inf
+        above = bisect_right(range(len(self._line_w)), heat_w, key=self._at)
+        if above == len(self._line_w):
+            return inf if heat_w > self._at(above - 1) else self._line_w[-1]
+        low_w, high_w = self._line_w[above - 1], self._line_w[above]
+        share = (heat_w - self._at(above - 1)) / (self._at(above) - self._at(above - 1))
+        return low_w + share * (high_w - low_w)

@@ -1,6 +1,7 @@
 """From preview to stages: the data of the trip ahead that a QP needs, in fixed slots."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,22 @@ class Stages:
     internal_off_w: NDArray[np.float64]
 
 
+class Preview(NamedTuple):
+    """The trip ahead as a navigation system delivers it in one second.
+
+    Attributes
+    ----------
+    short_demand_w, short_speed_mps : of each of the coming N seconds, shape (N,)
+    short_count : how many of them are driven before arrival
+    long : statistics of the trip beyond, block by block, class by class
+    """
+
+    short_demand_w: NDArray[np.float64]
+    short_speed_mps: NDArray[np.float64]
+    short_count: int
+    long: Stages
+
+
 class StageBuilder:
     """Cuts a trip into stages at any time step.
 
@@ -60,7 +77,9 @@ class StageBuilder:
         self.settings = settings
         self._vehicle = vehicle
         self.steps = truth.steps
-        self._short = _fields(truth, vehicle)
+        padding = np.zeros(settings.short_stages)
+        self._demand_w = np.concatenate([truth.demand_w, padding])
+        self._speed_mps = np.concatenate([truth.speed_mps, padding])
         demand_class = _demand_class(forecast.demand_w, settings)
         self._cumulative = _cumulative(forecast, vehicle, demand_class, settings.classes)
         block_s = settings.block_length_s(forecast.steps)
@@ -69,24 +88,45 @@ class StageBuilder:
         self._block_start = np.minimum(start, forecast.steps)
         self._block_end = np.minimum(start + block_s, forecast.steps)
 
+    def preview(self, step: int) -> Preview:
+        """Return the trip ahead from time step `step`; short_count is 0 after arrival."""
+        n = self.settings.short_stages
+        now = min(max(step, 0), self.steps)
+        fields = self._long_fields(now)
+        return Preview(
+            self._demand_w[now : now + n],
+            self._speed_mps[now : now + n],
+            min(n, self.steps - now),
+            Stages(*fields),
+        )
+
     def at(self, step: int) -> Stages:
         """Return the stages of the horizon that starts at time step `step`."""
-        n_short = self.settings.short_stages
-        seen = min(n_short, self.steps - step)
+        return self.stages(self.preview(step))
+
+    def stages(self, preview: Preview) -> Stages:
+        """Return the stages of a preview, short ones first."""
+        n, seen = self.settings.short_stages, preview.short_count
         fields = np.zeros((FIELDS, self.count))
-        fields[:, :seen] = self._short[:, step : step + seen]
+        trace = Trace(preview.short_demand_w[:seen], preview.short_speed_mps[:seen])
+        fields[:, :seen] = _fields(trace, self._vehicle)
+        long = preview.long
+        fields[:, n:] = (long.duration_s, long.net_w, long.speed_mps, long.internal_off_w)
+        return Stages(*fields)
+
+    def _long_fields(self, step: int) -> NDArray[np.float64]:
+        """Fields of the long stages; shape (FIELDS, blocks * classes)."""
+        n_short = self.settings.short_stages
         arriving = step + n_short >= self.steps
-        start = np.clip(step + seen, self._block_start, self._block_end)
+        start = np.clip(step + n_short, self._block_start, self._block_end)
         start = self._block_end if arriving else start
         # (classes, FIELDS, blocks) -> fields of the long stages, block by block, class by class
         sums = self._cumulative[:, :, self._block_end] - self._cumulative[:, :, start]
-        duration = sums[:, 0].T.ravel()
-        fields[0, n_short:] = duration
-        fields[1:, n_short:] = sums[:, 1:].transpose(1, 2, 0).reshape(FIELDS - 1, -1)
-        fields[1:, n_short:] /= np.maximum(duration, 1.0)
+        fields = sums.transpose(1, 2, 0).reshape(FIELDS, -1)
+        fields[1:] /= np.maximum(fields[0], 1.0)
         if self.settings.classes == 1:  # an averaged preview has only the mean demand
-            fields[3, n_short:] = internal_off_w(self._vehicle, fields[1, n_short:])
-        return Stages(*fields)
+            fields[3] = internal_off_w(self._vehicle, fields[1])
+        return fields
 
     def shift(self) -> NDArray[np.intp]:
         """Slot in the previous step's solution from which each slot's warm start comes.

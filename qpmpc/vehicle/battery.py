@@ -22,9 +22,8 @@ class BatteryMaps:
         self.discharge = Table(battery.soc_grid, battery.resistance_discharge_ohm)
         self.charge = Table(battery.soc_grid, battery.resistance_charge_ohm)
         self.charge_c = 3600.0 * battery.capacity_ah
-        self._soc_min, self._soc_max = battery.soc_min, battery.soc_max
+        self._soc_max = battery.soc_max
         self._power_charge_max_w = battery.power_charge_max_w
-        self._power_discharge_max_w = battery.power_discharge_max_w
 
     def energy_j(self, soc: float) -> float:
         """Energy of a unit of SOC about `soc`: U_oc(soc) times the capacity, in J."""
@@ -41,25 +40,22 @@ class BatteryMaps:
         root = voltage * voltage - 4.0 * resistance * power_w
         return (voltage - sqrt(max(root, 0.0))) / (2.0 * resistance)
 
-    def charge_limit_w(self, soc: float, duration_s: float) -> float:
-        """Most power the battery accepts: its limit, or what just fills it to soc_max.
+    def power_to_reach_w(self, soc: float, soc_end: float, duration_s: float) -> float:
+        """Terminal power, discharge positive, that leads from `soc` to `soc_end`.
 
-        min(P_chg, I (U + R I)) with I = (soc_max - soc) C_bat / duration, never negative.
+        I (U - R I) with I = (soc - soc_end) C_bat / duration; in discharge no more than the
+        battery can give, U^2/(4 R).
         """
-        current = max(self._soc_max - soc, 0.0) * self.charge_c / duration_s
-        filling = current * (self.open_circuit.at(soc) + self.charge.at(soc) * current)
-        return min(self._power_charge_max_w, filling)
-
-    def discharge_limit_w(self, soc: float, duration_s: float) -> float:
-        """Most power the battery may give: its limit, or what just empties it to soc_min.
-
-        min(P_dis, I (U - R I)) with I = (soc - soc_min) C_bat / duration, never negative.
-        """
-        current = max(soc - self._soc_min, 0.0) * self.charge_c / duration_s
-        voltage, resistance = self.open_circuit.at(soc), self.discharge.at(soc)
+        voltage = self.open_circuit.at(soc)
+        current = (soc - soc_end) * self.charge_c / duration_s
+        resistance = (self.discharge if current >= 0.0 else self.charge).at(soc)
         current = min(current, voltage / (2.0 * resistance))  # beyond it, power falls
-        emptying = current * (voltage - resistance * current)
-        return min(self._power_discharge_max_w, emptying)
+        return current * (voltage - resistance * current)
+
+    def charge_limit_w(self, soc: float, duration_s: float) -> float:
+        """Most power the battery accepts: its limit, or what just fills it to soc_max; >= 0."""
+        filling = -self.power_to_reach_w(soc, self._soc_max, duration_s)
+        return min(self._power_charge_max_w, max(filling, 0.0))
 
     def internal_power_w(self, soc: ArrayLike, power_w: ArrayLike) -> NDArray[np.float64]:
         """Power drawn from the store, G = U_oc I = P + R I^2, for arrays.

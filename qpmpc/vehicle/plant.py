@@ -10,6 +10,10 @@ from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.engine import OptimalLine, alpha_at
 from qpmpc.vehicle.parameters import Vehicle
 
+POWER_TOLERANCE_W = 1e-6
+BOILING_DEGC = 130.0  # half water, half glycol, at the overpressure of a usual cap, 1.1 bar
+EMPTY, FULL = 0.0, 1.0  # SOC
+
 
 class PlantState(NamedTuple):
     """State at the start of a step."""
@@ -36,8 +40,10 @@ class StepFlows(NamedTuple):
     """Every flow of one step, in W unless the name has another unit; the flows must balance.
 
     `p_bat_w` is the battery's power at its terminals (discharge positive), `internal_w` the power
-    that leaves its store, `p_friction_w` that of the friction brakes (electrical side, positive).
-    `power_excess_w` is the excess of the command over engine or battery power limits.
+    that leaves its store, `p_friction_w` that of the friction brakes (electrical side, positive),
+    `p_missing_w` demand that neither engine nor battery can meet, `boiling_w` heat that leaves with
+    the steam of boiling coolant. `power_excess_w` is the excess of the command over engine or
+    battery power limits.
     """
 
     fuel_g: float
@@ -46,10 +52,12 @@ class StepFlows(NamedTuple):
     p_bat_w: float
     internal_w: float
     p_friction_w: float
+    p_missing_w: float
     exhaust_w: float
     air_w: float
     radiator_w: float
     cabin_w: float
+    boiling_w: float
     coolant_w: float
     started: bool
     power_excess_w: float
@@ -86,7 +94,9 @@ class Plant:
         Braking power that the battery cannot take goes to the friction brakes; the battery takes
         less than its power limit where more would fill it beyond soc_max within the step. A
         command beyond the engine's limits is clipped to them; power that clipping and the battery
-        leave uncovered is reported as `power_excess_w`.
+        leave uncovered is reported as `power_excess_w`. Whatever is asked, the states stay
+        physical: the battery gives no more than it holds, the cabin takes no heat from coolant at
+        ambient temperature, and coolant beyond `BOILING_DEGC` boils.
 
         Parameters
         ----------
@@ -111,6 +121,9 @@ class Plant:
             p_bat - battery.power_discharge_max_w,
             -accepted - p_bat,
         )
+        wanted = p_bat
+        p_bat = min(p_bat, self.battery.power_to_reach_w(state.soc, EMPTY, h))
+        p_bat = max(p_bat, self.battery.power_to_reach_w(state.soc, FULL, h))
         started = on and not state.engine_on
         fuel_g = 0.0
         if on:
@@ -122,10 +135,16 @@ class Plant:
         radiator = heat.radiator_w(vehicle.thermal, state.t_cl_degc)
         cabin = heat.cabin_w(vehicle.thermal, state.t_cl_degc)
         coolant = fuel_w - p_eng - exhaust - air - radiator - cabin
+        w_per_k = vehicle.thermal.heat_capacity_j_per_k / h
+        room_k = state.t_cl_degc - vehicle.thermal.t_amb_degc  # to ambient temperature
+        spared = min(max(-coolant - max(room_k, 0.0) * w_per_k, 0.0), cabin)
+        cabin, coolant = cabin - spared, coolant + spared
+        boiling = max(coolant - (BOILING_DEGC - state.t_cl_degc) * w_per_k, 0.0)
+        coolant -= boiling
         current = self.battery.current_a(state.soc, p_bat)
         following = PlantState(
             state.soc - h * current / self.battery.charge_c,
-            state.t_cl_degc + h * coolant / vehicle.thermal.heat_capacity_j_per_k,
+            state.t_cl_degc + coolant / w_per_k,
             on,
         )
         flows = StepFlows(
@@ -135,15 +154,14 @@ class Plant:
             p_bat_w=p_bat,
             internal_w=current * self.battery.open_circuit.at(state.soc),
             p_friction_w=friction,
+            p_missing_w=wanted - p_bat,
             exhaust_w=exhaust,
             air_w=air,
             radiator_w=radiator,
             cabin_w=cabin,
+            boiling_w=boiling,
             coolant_w=coolant,
             started=started,
             power_excess_w=excess if excess > POWER_TOLERANCE_W else 0.0,
         )
         return following, flows
-
-
-POWER_TOLERANCE_W = 1e-6

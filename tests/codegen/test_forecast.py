@@ -66,7 +66,7 @@ def assert_same_inputs(
     truth = rounded(truth, library.precision)
     said = None if said is None else rounded(said, library.precision)
     preview = StageBuilder(CAR, truth, said or truth, settings.mh_qp.horizon)
-    python, ours = InputBuilder(preview, truth), ForecastInputs(library, truth, said)
+    python, ours = InputBuilder(preview.preview), ForecastInputs(library, truth, said)
     want, have = library.input_type(), library.input_type()
     relative, power_w, speed_mps = TOLERANCE[library.precision]
     for step in range(truth.steps) if steps is None else steps:

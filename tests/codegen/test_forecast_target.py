@@ -102,7 +102,7 @@ def test_cost_on_the_target_is_as_documented_and_does_not_grow_with_the_trip(tmp
     assert steps[1:].max() == pytest.approx(a_step, rel=0.03)
     assert start / wltc.steps == pytest.approx(a_start, rel=0.03)
     double = Trace(*(x.astype(float) for x in (single.demand_w, single.speed_mps)))
-    python = InputBuilder(StageBuilder(CAR, double, double, HORIZON), double)
+    python = InputBuilder(StageBuilder(CAR, double, double, HORIZON).preview)
     want, _ = structures("f64", HORIZON.short_stages, HORIZON.classes * HORIZON.blocks)
     want = want()
     for step, have in enumerate(inputs):

@@ -208,7 +208,7 @@ def recorded(
     trace = Trace.of(cycle, car)
     drove = simulate(cycle, "rule-based", car).trajectory
     library = build_host_library(numbers(vehicle), precision, algorithm)
-    inputs = InputBuilder(StageBuilder(car, trace, trace, SETTINGS.mh_qp.horizon), trace)
+    inputs = InputBuilder(StageBuilder(car, trace, trace, SETTINGS.mh_qp.horizon).preview)
     state = ctypes.create_string_buffer(library.state_bytes)
     into, out = library.input_type(), library.output_type()
     arguments = state, ctypes.byref(into), ctypes.byref(out)

@@ -66,7 +66,7 @@ def test_double_precision_on_the_target_equals_the_host_library(tmp_path) -> Non
     trip = Trip("nycc", VEHICLE)
     unprepared = SETTINGS.with_settings({"mh_qp.prepared": False})
     host = GeneratedController(trip, unprepared)
-    inputs = InputBuilder(trip.preview(SETTINGS.mh_qp.horizon), trip.truth)
+    inputs = InputBuilder(trip.preview(SETTINGS.mh_qp.horizon).receive)
     state = trip.plant.initial_state()
     with Target(elf, VALUES, "f64", tmp_path) as target:
         target.init()

@@ -110,7 +110,7 @@ class Renderings:
             blocks = chosen.horizon.block_count(trip.forecast.steps)
             to_the_end = settings.with_settings({"mh_qp.admm.rho": C_RHO})
             values = values_of(vehicle, to_the_end.mh_qp, settings.rule_based, blocks)
-            self.generated = GeneratedQp(values, InputBuilder(self.preview, trip.truth))
+            self.generated = GeneratedQp(values, InputBuilder(self.preview.receive))
         self._solver = Piqp(EXACT)
         self._is_set_up = False
 

@@ -6,14 +6,16 @@
 mpc_real reader_prepare(mpc_state *state, const mpc_in *in, const mpc_real *x)
 {
     mpc_init(state);
-    (void)mpc_check_measured(&state->good, in);
+    int32_t elapsed = 0;
+    (void)mpc_check_measured(&state->watch, in, &elapsed);
+    mpc_qp_road(state, in);
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         for (int32_t i = 0; i < MPC_VARS; i++) {
             state->stage[k].x[i] = x[(k * MPC_VARS) + i];
         }
     }
     state->phase = MPC_PHASE_RUNNING;
-    prepare(state, in);
+    prepare(state);
     state->phase = MPC_PHASE_DEPARTING; /* from here on the iterate is in the solver's units */
     return state->cost;
 }

@@ -1,0 +1,93 @@
+/* Check of the preview: possible for this car, and going on from the one received before.
+ *
+ * Each second that passes takes at most a second, and what is driven in it, out of the statistics
+ * of the trip; NEWS is the share of the trip that may change beside that. A new route is therefore
+ * used from its second second on.
+ */
+#include "mpc_constants.h"
+#include "mpc_model.h"
+#include "mpc_parts.h"
+#include "mpc_real.h"
+
+static int32_t is_possible(const mpc_in *in)
+{
+    int32_t fine = ((in->short_count >= 1) && (in->short_count <= MPC_SHORT)) ? 1 : 0;
+    for (int32_t k = 0; k < MPC_SHORT; k++) {
+        fine &= mpc_check_second(in->short_demand_w[k], in->short_speed_mps[k]);
+    }
+    for (int32_t k = 0; k < MPC_LONG; k++) {
+        fine &= within(in->long_duration_s[k], REAL(0.0), LONGEST_STAGE_S);
+        fine &= within(in->long_net_w[k], mpc_par.can_net_min_w, mpc_par.can_net_max_w);
+        fine &= within(in->long_speed_mps[k], REAL(0.0), mpc_par.can_speed_max_mps);
+        fine &= within(in->long_internal_off_w[k], mpc_par.can_internal_min_w,
+                       mpc_par.can_internal_max_w);
+    }
+    return fine;
+}
+
+static int32_t goes_on(const mpc_heard *before, const mpc_in *in)
+{
+    mpc_real total_s = REAL(0.0);
+    mpc_real moved_s = REAL(0.0);
+    mpc_real moved_net_j = REAL(0.0);
+    mpc_real moved_internal_j = REAL(0.0);
+    mpc_real news_w = REAL(0.0);
+    for (int32_t k = 0; k < MPC_LONG; k++) {
+        const mpc_real old_s = before->long_duration_s[k];
+        const mpc_real new_s = in->long_duration_s[k];
+        total_s += old_s;
+        moved_s += REAL_ABS(new_s - old_s);
+        moved_net_j += REAL_ABS((new_s * in->long_net_w[k]) - (old_s * before->long_net_w[k]));
+        moved_internal_j += REAL_ABS((new_s * in->long_internal_off_w[k])
+                                     - (old_s * before->long_internal_off_w[k]));
+    }
+    for (int32_t k = 0; k < MPC_SHORT; k++) {
+        const int32_t from = (before->age < MPC_SHORT) ? (k + before->age) : MPC_SHORT;
+        const mpc_real seen = (from < MPC_SHORT) ? REAL(1.0) : REAL(0.0);
+        const mpc_real old_w = before->short_demand_w[(from < MPC_SHORT) ? from : 0];
+        news_w += seen * REAL_ABS(in->short_demand_w[k] - old_w);
+    }
+    const mpc_real free_s = (REAL(2.0) * (mpc_real)before->age) + (NEWS * total_s);
+    const mpc_real net_w = mpc_par.can_net_max_w - mpc_par.can_net_min_w;
+    const mpc_real internal_w = mpc_par.can_internal_max_w - mpc_par.can_internal_min_w;
+    int32_t fine = within(moved_s, REAL(0.0), free_s);
+    fine &= within(moved_net_j, REAL(0.0), free_s * net_w);
+    fine &= within(moved_internal_j, REAL(0.0), free_s * internal_w);
+    fine &= within(news_w, REAL(0.0), NEWS * (mpc_real)MPC_SHORT * mpc_par.can_net_max_w);
+    return fine;
+}
+
+static void hear(mpc_heard *heard, const mpc_in *in)
+{
+    for (int32_t k = 0; k < MPC_SHORT; k++) {
+        heard->short_demand_w[k] = in->short_demand_w[k];
+    }
+    for (int32_t k = 0; k < MPC_LONG; k++) {
+        heard->long_duration_s[k] = in->long_duration_s[k];
+        heard->long_net_w[k] = in->long_net_w[k];
+        heard->long_internal_off_w[k] = in->long_internal_off_w[k];
+    }
+    heard->age = 0;
+}
+
+/* For a departure: this preview has none before it. */
+int32_t mpc_preview_first(mpc_heard *heard, const mpc_in *in)
+{
+    const int32_t possible = is_possible(in);
+    if (possible != 0) {
+        hear(heard, in);
+    }
+    return possible;
+}
+
+int32_t mpc_preview_check(mpc_heard *heard, const mpc_in *in, int32_t elapsed)
+{
+    heard->age = ((heard->age + elapsed) < MPC_NO_PLAN) ? (heard->age + elapsed) : MPC_NO_PLAN;
+    const int32_t possible = is_possible(in);
+    const int32_t first = (heard->age == MPC_NO_PLAN) ? 1 : 0;
+    const int32_t fine = possible & (first | goes_on(heard, in));
+    if (possible != 0) {
+        hear(heard, in);
+    }
+    return fine;
+}

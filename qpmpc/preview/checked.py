@@ -1,0 +1,154 @@
+"""A preview that is checked every second; what is not plausible is replaced by the last good one.
+
+The same in C: codegen/runtime/mpc_check.c and mpc_qp.c. Described in docs/safety.md.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpmpc.errors import QpmpcError
+from qpmpc.preview.horizon import HorizonSettings
+from qpmpc.preview.stages import Preview, StageBuilder, Stages
+from qpmpc.vehicle.capability import Capability
+from qpmpc.vehicle.parameters import Vehicle
+
+LONGEST_STAGE_S = 1e5
+NEWS = 0.2  # share of a preview that may change from one second to the next
+
+
+class NoPreviewError(QpmpcError):
+    """There is no plausible preview of this second, and none of the last N seconds to go on with.
+
+    `RecedingHorizon` takes it as a planner without a plan.
+    """
+
+
+class CheckedPreview:
+    """The stages of each second, from plausible previews only.
+
+    A preview is plausible if the car can drive it and if it goes on from the one received before:
+    a second that passes takes a second out of the trip ahead. A new route is therefore used from
+    its second second on. In place of one that is not plausible the last good one serves for up to
+    N - 1 seconds: its short stages move up and are masked at the end, its long ones are still
+    ahead.
+
+    Parameters
+    ----------
+    source : cuts the trip into stages
+    vehicle : parameters
+    receive : returns the preview of a second; that of the source if None
+
+    Attributes
+    ----------
+    was_bad : whether the last second's own preview was not plausible
+    """
+
+    def __init__(
+        self,
+        source: StageBuilder,
+        vehicle: Vehicle,
+        receive: Callable[[int], Preview] | None = None,
+    ) -> None:
+        self.source, self.was_bad = source, False
+        self.receive = receive or source.preview
+        self._can = Capability.of(vehicle)
+        self._last: Stages | None = None
+        self._last_step = 0
+        self._received: Preview | None = None
+        self._received_step = 0
+
+    @property
+    def settings(self) -> HorizonSettings:
+        """Layout of the stages."""
+        return self.source.settings
+
+    @property
+    def count(self) -> int:
+        """Number of stages."""
+        return self.source.count
+
+    def shift(self) -> NDArray[np.intp]:
+        """See `StageBuilder.shift`."""
+        return self.source.shift()
+
+    def forget(self) -> None:
+        """Forget all earlier previews."""
+        self._last = self._received = None
+
+    def at(self, step: int) -> Stages:
+        """Return the stages of the horizon that starts at time step `step`.
+
+        Raises
+        ------
+        NoPreviewError
+            If there is none to go by.
+        """
+        received = self.receive(step)
+        possible = self._is_possible(received)
+        self.was_bad = not (possible and self._goes_on(received, step))
+        if possible:
+            self._received, self._received_step = received, step
+        if not self.was_bad:
+            self._last, self._last_step = self.source.stages(received), step
+            return self._last
+        passed = step - self._last_step
+        if self._last is None or not 0 <= passed < self.settings.short_stages:
+            raise NoPreviewError(f"no plausible preview at {step} s")
+        return _moved_up(self._last, passed, self.settings.short_stages)
+
+    def _is_possible(self, preview: Preview) -> bool:
+        """Whether the car can drive it."""
+        can, n, long = self._can, self.settings.short_stages, preview.long
+        return (
+            1 <= preview.short_count <= n
+            and _within(preview.short_demand_w, can.demand_min_w, can.demand_max_w)
+            and _within(preview.short_speed_mps, 0.0, can.speed_max_mps)
+            and _within(long.duration_s, 0.0, LONGEST_STAGE_S)
+            and _within(long.net_w, can.net_min_w, can.net_max_w)
+            and _within(long.speed_mps, 0.0, can.speed_max_mps)
+            and _within(long.internal_off_w, can.internal_min_w, can.internal_max_w)
+        )
+
+    def _goes_on(self, preview: Preview, step: int) -> bool:
+        """Whether it is that of the second before, but for the time passed and some news.
+
+        Each second that passes takes at most a second, and what is driven in it, out of the
+        statistics of the trip; NEWS is the share of the trip that may change beside that.
+        """
+        before, can = self._received, self._can
+        if before is None:
+            return True
+        passed = step - self._received_step
+        old, new = before.long, preview.long
+        free_s = 2.0 * passed + NEWS * float(old.duration_s.sum())
+        kept = self.settings.short_stages - passed
+        news_w = np.abs(preview.short_demand_w[: max(kept, 0)] - before.short_demand_w[passed:])
+        return (
+            float(np.abs(new.duration_s - old.duration_s).sum()) <= free_s
+            and _moved(old, new, "net_w") <= free_s * (can.net_max_w - can.net_min_w)
+            and _moved(old, new, "internal_off_w")
+            <= free_s * (can.internal_max_w - can.internal_min_w)
+            and float(news_w.sum()) <= NEWS * self.settings.short_stages * can.net_max_w
+        )
+
+
+def _moved(old: Stages, new: Stages, field: str) -> float:
+    """Change of a quantity, summed over the time of each long stage."""
+    totals = [stages.duration_s * getattr(stages, field) for stages in (old, new)]
+    return float(np.abs(totals[1] - totals[0]).sum())
+
+
+def _within(values: NDArray[np.float64], low: float, high: float) -> bool:
+    """False for NaN."""
+    return bool(((values >= low) & (values <= high)).all())
+
+
+def _moved_up(stages: Stages, by: int, n_short: int) -> Stages:
+    """Short stages move up by some seconds and are masked at the end; long ones stay."""
+    fields = np.stack([stages.duration_s, stages.net_w, stages.speed_mps, stages.internal_off_w])
+    moved = fields.copy()
+    moved[:, : n_short - by] = fields[:, by:n_short]
+    moved[:, n_short - by : n_short] = 0.0
+    return Stages(*moved)

@@ -1,0 +1,1 @@
+"""What the safety layer promises, tested against all commands of a second (docs/safety.md)."""
