@@ -91,6 +91,7 @@ class GeneratedController(Controller):
         rules, section = self.settings.rule_based, name.replace("-", "_")
         values = values_of(trip.vehicle, self.of_qp, rules, blocks, section)
         self.library = build_host_library(values, precision)
+        self.remarks += filter(None, [self.library.remark])
         self.fill_s = self.call_s = 0.0
         self.inputs = InputBuilder(trip.preview(self.of_qp.horizon).receive)
         self._state = ctypes.create_string_buffer(self.library.state_bytes)

@@ -115,9 +115,10 @@ class Names:
             return point.load()
         except Exception as error:
             owner = point.dist.name if point.dist else "an installed package"
+            reason = " ".join(str(error).split())  # such a message may have several lines
             raise InputError(
                 f"{self.kind} {name!r} of {owner} cannot be loaded from {point.value}: "
-                f"{type(error).__name__}: {error}"
+                f"{type(error).__name__}: {reason}"
             ) from error
 
     def unknown(self, name: str) -> str:

@@ -12,12 +12,18 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from qpmpc.cli.inputs import STDOUT
 from qpmpc.controllers.base import Progress as Report
 from qpmpc.files import json_text, write_text
+from qpmpc.shown import shown
 
 UNLIMITED_WIDTH = 1000
 
 
 class _Console(Console):
-    """Console that leaves a broken pipe to `main`."""
+    """Console that prints text as it is, control characters escaped; `main` gets broken pipes."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print text without markup, or a table."""
+        plain = (shown(each) if isinstance(each, str) else each for each in objects)
+        super().print(*plain, **{"markup": False, **options})
 
     def on_broken_pipe(self) -> None:
         """Raise, where rich would exit with code 1."""
@@ -55,6 +61,7 @@ class ProgressBar:
         """Start a job; returns the function to call with its progress."""
         done_before = self._begun
         self._begun += 1
+        title = shown(title)
         label = f"{title} ({self._begun}/{self._jobs})" if self._jobs > 1 else title
         self._progress.update(self._task, description=label, completed=float(done_before))
 

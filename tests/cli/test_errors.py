@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NoReturn
 
 import pytest
+from hostile import limited_disk
 
 from qpmpc.cli import main
 
@@ -140,16 +141,12 @@ def test_anything_else_is_one_line_and_exit_code_1(cli, trip, tmp_path, monkeypa
         main(["simulate", str(trip)])
 
 
-def test_full_disk_leaves_no_part_of_a_file(cli, trip, tmp_path, monkeypatch):
-    def full(path, content):
-        with path.open("wb") as file:
-            file.write(content[:10])
-        raise OSError(28, "No space left on device", str(path))
-
-    monkeypatch.setattr(Path, "write_bytes", full)
-    done = cli("simulate", trip, "--json", tmp_path / "run.json")
+def test_full_disk_leaves_no_part_of_a_file(cli, trip, tmp_path):
+    file = tmp_path / "run.json"
+    with limited_disk(100):
+        done = cli("simulate", trip, "--controller", "rule-based", "--json", file)
     assert done.code == 1
-    assert "No space left" in done.err
+    assert done.err == f"qpmpc: {file}: File too large\n"
     assert list(tmp_path.iterdir()) == [trip]
 
 

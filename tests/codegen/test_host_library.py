@@ -12,7 +12,7 @@ import pytest
 
 from qpmpc.closed_loop import drive
 from qpmpc.codegen.controller import GeneratedController
-from qpmpc.codegen.host_library import CodegenError, compiler
+from qpmpc.codegen.host_library import CodegenError, compiled, compiler
 from qpmpc.codegen.values import CONSTANTS
 from qpmpc.controllers.base import Decision
 from qpmpc.controllers.mh_qp import MhQp
@@ -382,12 +382,18 @@ def test_a_damaged_library_in_the_cache_is_built_again(tmp_path) -> None:
     trip.write_text("time_s,speed_mps\n" + "".join(f"{t},10\n" for t in range(8)))
     command = [sys.executable, "-m", "qpmpc", "simulate", str(trip), "--json", "-"]
     environment = os.environ | {"QPMPC_CACHE_DIR": str(tmp_path / "cache")}
-    for _ in range(2):
+    foreign = compiled({"other.c": "int other(void) { return 1; }\n"}).read_bytes()
+    spoils = (
+        lambda whole: whole[: len(whole) // 2],  # to load it would end the process by SIGBUS
+        lambda whole: foreign,  # to load it would go well, to use it not
+        lambda whole: whole,
+    )
+    for spoil in spoils:
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
         assert json.loads(done.stdout)["solver"]["implementation"] == "c"
         (library,) = (tmp_path / "cache" / "compiled").iterdir()
         assert library.stat().st_size > 1000
-        library.write_bytes(b"")
+        library.write_bytes(spoil(library.read_bytes()))
 
 
 # 30 s are cut into blocks of 5 s: six of them, and an empty seventh, in C as in Python.
