@@ -12,6 +12,7 @@ from qpmpc.errors import InputError
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.expressions import code_of, expression
+from qpmpc.qp.heat_reserve import heat_reserve_k
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.quantities import Quantities
 from qpmpc.qp.rows import ROWS, SHORTEST_SCALE_S, VARIABLES, VARS, Rows, Var, cost_terms, states
@@ -35,7 +36,8 @@ class QpSettings(BaseModel):
     soc_penalty_g : lambda of a quadratic terminal cost, g per (unit SOC)^2, instead of the band
     soc_reserve : share of the room between the lower SOC limit and the initial SOC that stages of
         more than 1 s are planned to leave, for errors of the forecast
-    t_cl_margin_k : the coolant is planned to stay this far above its lower limit
+    t_cl_margin_k : the coolant is planned to stay this far above its lower limit, beside the
+        reserve of `heat_reserve_k`
     slack_g_per_k : price of exceeding a coolant limit, g per K and stage
     regularisation : quadratic cost on rates and slack in solver units, far below any fuel
     """
@@ -102,7 +104,7 @@ def qp_parameters(
         "terminal_soc_low": soc_low,
         "terminal_soc_high": soc_high,
         "soc_penalty_g": settings.soc_penalty_g,
-        "t_min_degc": thermal.t_cl_min_degc + settings.t_cl_margin_k,
+        "t_min_degc": thermal.t_cl_min_degc + settings.t_cl_margin_k + heat_reserve_k(vehicle),
         "t_max_degc": thermal.t_cl_max_degc - T_CL_MAX_MARGIN_K,
         "slack_g_per_k": settings.slack_g_per_k,
         "regularisation": settings.regularisation,
