@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from qpmpc.errors import InputError
+from qpmpc.input_text import check_path
 
 
 def check_folder(folder: Path, option: str) -> None:
@@ -21,6 +22,7 @@ def check_folder(folder: Path, option: str) -> None:
     InputError
         If it or the nearest existing parent is not a directory or cannot be written to.
     """
+    check_path(folder, f"{option} ")
     nearest = folder
     while not nearest.exists():
         if nearest.is_symlink():
@@ -40,6 +42,7 @@ def check_file(file: Path, option: str) -> None:
     InputError
         If it is a directory, or its folder cannot be written to.
     """
+    check_path(file, f"{option} ")
     if file.is_dir():
         raise InputError(f"{option} {file}: is a directory, give the name of a file")
     check_folder(file.parent, option)

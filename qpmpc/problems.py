@@ -60,6 +60,8 @@ def shown_value(value: object) -> str:
         return _cut(str(value).lower() if isinstance(value, bool) else repr(value))
     except ValueError:  # Python prints no integer of more than some thousand digits
         return "a number too long to show"
+    except RecursionError:
+        return "a value nested too deeply to show"
 
 
 def _wrong(each: ErrorDetails, key: str, owner: str, origins: Mapping[str, str]) -> str:

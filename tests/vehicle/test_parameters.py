@@ -61,7 +61,7 @@ def test_bad_values_are_named_in_one_line(tmp_path, old, new, named):
 def test_missing_files_and_unknown_names_say_what_is_allowed(tmp_path):
     with pytest.raises(InputError, match="prius-nimh"):
         load_vehicle("prius")
-    with pytest.raises(InputError, match="No such file"):
+    with pytest.raises(InputError, match="no such file"):
         load_vehicle(tmp_path / "none.toml")
 
 
