@@ -16,6 +16,8 @@ _WORDS = {
     "dict_type": "must be a table",
     "tuple_type": "must be an array",
     "too_short": "must have at least {min_length} entries",
+    "too_long": "must have at most {max_length} entries",
+    "string_too_long": "must have at most {max_length} characters",
 }
 
 
