@@ -13,7 +13,7 @@ NUMBERS = {
     "thermal.cabin_heat_w": st.floats(0.0, 1e4),
     "battery.aux_power_w": st.floats(0.0, 1e4),
     "trip.soc_init": st.floats(0.4, 0.8),
-    "trip.t_cl_init_degc": st.floats(-100.0, 150.0),
+    "trip.t_cl_init_degc": st.floats(-50.0, 150.0),
 }
 NAMES = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", fullmatch=True)
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=40)

@@ -105,7 +105,7 @@ class Engine(Section):
     friction_kj_per_rev_l: Friction
     torque_speed_rpm: Speeds
     torque_max_nm: Torques
-    start_fuel_g: Annotated[float, Field(ge=0.0, le=100.0)]
+    start_fuel_g: Annotated[float, Field(ge=0.0, le=10.0)]  # burnt within a second
 
     @property
     def lhv_j_per_g(self) -> float:
@@ -244,7 +244,7 @@ class Trip(Section):
     """Initial state of a run, and the price of a difference in final SOC."""
 
     soc_init: Share
-    t_cl_init_degc: Celsius
+    t_cl_init_degc: Annotated[float, Field(ge=-50.0, le=150.0)]  # no colder than the air
     eta_eq: Annotated[float, Field(ge=0.01, lt=1.0)]
 
 
