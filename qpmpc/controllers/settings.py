@@ -7,6 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from qpmpc.errors import InputError
 from qpmpc.preview.horizon import HorizonSettings
+from qpmpc.problems import shown_value
 from qpmpc.pwa.model import PwaTolerances
 from qpmpc.qp.scaling import ScalingSettings
 from qpmpc.qp.stage_qp import QpSettings
@@ -218,7 +219,7 @@ class ControllerSettings(BaseModel):
             section, _, rest = key.partition(".")
             if not rest:
                 raise InputError(
-                    f"no parameter {key!r}: names start with a section and a dot, "
+                    f"no parameter {shown_value(key)}: names start with a section and a dot, "
                     "such as mh_qp.admm.iterations"
                 )
             if section in self.sections():
