@@ -1,5 +1,6 @@
 """Settings of the shipped controllers, and their dotted names."""
 
+import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self, TypeVar
 
@@ -245,7 +246,7 @@ def refuse_old_name(key: str, value: object) -> None:
         One line with the new name.
     """
     section, _, rest = key.partition(".")
-    if section not in ("mh_qp", "mh_qp_paper", "baseline_mpc"):
+    if section not in ("mh_qp", "mh_qp_paper", "baseline_mpc") or not re.fullmatch(r"[\w.]+", rest):
         return
     for old, new in RENAMED.items():
         if rest == old or rest.startswith(f"{old}."):

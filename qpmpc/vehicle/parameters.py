@@ -100,7 +100,7 @@ class Engine(Section):
     power_min_w: Annotated[float, Field(ge=0.0, le=500e3)]
     lhv_j_per_kg: Annotated[float, Field(ge=1e7, le=1.5e8)]  # methanol 2e7, hydrogen 1.2e8
     density_kg_per_l: Annotated[float, Field(ge=1e-5, le=2.0)]  # hydrogen gas 8e-5
-    indicated_efficiency: Annotated[float, Field(ge=0.05, le=0.8)]  # 0.8: Otto's ideal cycle
+    indicated_efficiency: Annotated[float, Field(ge=0.15, le=0.8)]  # 0.8: far above any engine
     friction_speed_rpm: Speeds
     friction_kj_per_rev_l: Friction
     torque_speed_rpm: Speeds
