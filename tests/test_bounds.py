@@ -6,6 +6,9 @@ from typing import Any, NamedTuple, get_args, get_origin
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import settings as examples
+from hypothesis import strategies as st
 from pydantic import BaseModel
 
 from qpmpc import simulate
@@ -174,6 +177,7 @@ def test_what_does_not_fit_a_trip_is_one_line_in_either_implementation(
     assert capfd.readouterr() == ("", "")  # nor a word of the solver's
 
 
+FAST: dict[str, object] = {"rule_based.balance": False}
 SMALL_QP: dict[str, object] = {
     "mh_qp.implementation": "python",
     "mh_qp.horizon.short_stages": 6,
@@ -187,7 +191,7 @@ def run_at(controller, settings: dict[str, object]) -> None:
     if refusal(settings):
         return
     try:
-        run = simulate(TRIP, controller, settings={"rule_based.balance": False, **settings})
+        run = simulate(TRIP, controller, settings={**FAST, **settings})
     except InputError:  # of several together, found where the maps are made
         return
     for values in (run.trajectory.soc, run.trajectory.t_cl_degc, run.trajectory.fuel_g):
@@ -227,13 +231,26 @@ def test_a_controller_at_its_bounds_runs(number):
             run_at(section.replace("_", "-"), {**settings, number.name: value})
 
 
+@examples(max_examples=60, deadline=None)
+@given(data=st.data(), controller=st.sampled_from(["rule-based", "ecms", "mh-qp"]))
+def test_cars_that_are_odd_in_several_ways_run_or_are_refused(data, controller):
+    """Also where a single bound would not show it; hot and empty cars are not refused."""
+    odd = data.draw(st.lists(st.sampled_from(SCALARS), min_size=2, max_size=4, unique=True))
+    changes = {n.name: data.draw(st.sampled_from([n.least, n.greatest])) for n in odd}
+    if refusal(changes):
+        return
+    run = simulate(TRIP, controller, settings={**FAST, **SMALL_QP, **changes})
+    assert all(np.isfinite(values).all() for values in (run.trajectory.soc, run.trajectory.fuel_g))
+    assert np.isfinite(run.trajectory.t_cl_degc).all()
+
+
 COARSE = {"dp.soc_step": 0.02, "dp.t_cl_step_k": 2.0, "dp.power_step_w": 4e3, "dp.refinement": 2}
 WITHOUT = {"thermal.radiator_w_per_k": 0.0, "trip.t_cl_init_degc": 86.0}
 
 
 @pytest.mark.parametrize("controller", ["c", "python", "rule-based", "ecms", "dp", CvxpyPlanner])
 def test_a_car_without_a_radiator_runs(controller):
-    settings: dict[str, object] = {**WITHOUT, "rule_based.balance": False}
+    settings: dict[str, object] = {**WITHOUT, **FAST}
     if controller in ("c", "python"):
         settings["mh_qp.implementation"] = controller
         controller = "mh-qp"
