@@ -60,9 +60,10 @@ def thermostat_step(
     decay = where(ever > 0.0, exp(open_for), 1.0)
     settled = where(ever > 0.0, -expm1(open_for), 0.0)  # 1 - decay, exact for short stages too
     # the exponential, for as long as it is open; then the line, from u = 0
+    apart = start_k - aim
     curved = start_k * decay + aim * settled  # no difference of large numbers for a small slope
     closes = where(start_k >= 0.0, where(curved < 0.0, 1.0, 0.0), 0.0)
-    shut = where(closes > 0.0, start_k - aim, 1.0)
+    shut = where(closes > 0.0, apart, 1.0)
     share = where(closes > 0.0, start_k / where(closes > 0.0, -aim, 1.0), 0.0)
     line_s = duration_s - where(closes > 0.0, tau * log1p(share), 0.0)
 
