@@ -11,6 +11,7 @@ from stat import S_ISREG
 from typing import Any
 
 from qpmpc.errors import InputError, QpmpcError
+from qpmpc.input_text import check_path
 from qpmpc.shown import is_plain
 
 MOST_LINKS = 40  # in a row, as in Linux
@@ -30,6 +31,7 @@ def check_folder(folder: Path, option: str) -> None:
     InputError
         If it or the nearest existing parent is not a directory or cannot be written to.
     """
+    check_path(folder, f"{option} ")
     nearest = folder
     try:
         while _stat(nearest) is None:
@@ -52,6 +54,7 @@ def check_file(file: Path, option: str) -> None:
     InputError
         If it is a directory, or it or its folder cannot be written to.
     """
+    check_path(file, f"{option} ")
     try:
         found = _stat(file)
     except OSError as error:

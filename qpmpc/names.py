@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from qpmpc.errors import InputError
+from qpmpc.problems import shown_value
 from qpmpc.remarks import say_once
 
 
@@ -142,4 +143,4 @@ def unknown(kind: str, name: str, allowed: tuple[str, ...], also: str = "") -> s
     """Return the message for an unknown name: the nearest known one and all others."""
     near = difflib.get_close_matches(name, allowed, n=1)
     hint = f", did you mean {near[0]!r}?" if near else ":"
-    return f"unknown {kind} {name!r}{hint} use one of {', '.join(allowed)}{also}"
+    return f"unknown {kind} {shown_value(name)}{hint} use one of {', '.join(allowed)}{also}"

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from qpmpc.cli.inputs import STDOUT
+from qpmpc.cli.stdout import to_stderr
 from qpmpc.controllers.base import Progress as Report
 from qpmpc.files import json_text, write_text
 from qpmpc.shown import shown
@@ -73,15 +74,18 @@ class ProgressBar:
 
 @contextmanager
 def progress_bar(jobs: int) -> Iterator[ProgressBar]:
-    """Show a progress bar while the block runs; it leaves no trace."""
+    """Show a progress bar while the block runs; neither it nor a solver writes to stdout."""
     console = Console(stderr=True)
-    with Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    ) as progress:
+    with (
+        to_stderr(),
+        Progress(
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            TaskProgressColumn(),
+            TimeRemainingColumn(),
+            console=console,
+            transient=True,
+            disable=not console.is_terminal,
+        ) as progress,
+    ):
         yield ProgressBar(progress, jobs)

@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 from types import CodeType
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from qpmpc.errors import InputError
 from qpmpc.preview.stages import Stages
@@ -21,7 +21,6 @@ from qpmpc.qp.structure import QpStructure
 from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
-Weight = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 T_CL_MAX_MARGIN_K = 0.05  # small: the radiator is fully open only at the limit itself
 LEAST_COST = 1e-9  # of any fuel entry: where all stages are masked the cost is scaled by this
@@ -46,11 +45,17 @@ class QpSettings(BaseModel):
 
     terminal_low: Annotated[float, Field(gt=0.0, le=1.5)] = 1.0
     terminal_high: Annotated[float, Field(gt=0.0, le=1.5)] = 1.01
-    soc_penalty_g: Annotated[float, Field(ge=0.0)] = 0.0
+    soc_penalty_g: Annotated[float, Field(ge=0.0, le=1e9)] = 0.0
     soc_reserve: Annotated[float, Field(ge=0.0, le=0.9)] = 0.42
     t_cl_margin_k: Annotated[float, Field(ge=0.0, le=10.0)] = 0.5
-    slack_g_per_k: Weight = 10.0
+    slack_g_per_k: Annotated[float, Field(ge=1e-6, le=1e6)] = 10.0
     regularisation: Annotated[float, Field(ge=0.0, le=1.0)] = 1e-5
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.terminal_low > self.terminal_high:
+            raise ValueError("terminal_low must not be above terminal_high")
+        return self
 
 
 @dataclass(frozen=True)

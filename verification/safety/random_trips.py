@@ -1,4 +1,4 @@
-"""Random trips through hills and winter: does a controller keep the limits that can be kept?"""
+"""Random trips through hills and winter, on which a controller has to keep its limits."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
