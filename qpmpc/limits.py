@@ -71,7 +71,8 @@ def sentence(vehicle: Vehicle, run: "Trajectory", excess: Excess) -> str:
     """Say where limits are exceeded, by how much, and whether the trip is beyond the car.
 
     It is where no command keeps all limits of the next second, which the safety layer knows: the
-    command applied is then its own. Empty if all limits are kept.
+    command applied is then its own. Another choice earlier on may have kept them: only dynamic
+    programming can tell. Empty if all limits are kept.
     """
     seconds = np.flatnonzero(excess.any).tolist()
     if not seconds:
@@ -88,11 +89,10 @@ def sentence(vehicle: Vehicle, run: "Trajectory", excess: Excess) -> str:
         (excess.power_w, f"power {excess.power_w.max():.3g} W beyond its limits"),
     ]  # fmt: skip
     worst = ", ".join(text for values, text in parts if values.any())
-    what = "limits are exceeded"
+    where = f"from {seconds[0]} s on, in {len(seconds)} of {len(run.fuel_g)} s,"
     if unavoidable:
-        what = "the trip is beyond the car, no command keeps all limits,"
-    where = f"from {seconds[0]} s on, in {len(seconds)} of {len(run.fuel_g)} s"
-    return f"{what} {where}: {worst}"
+        return f"{where} the trip is beyond the car, whatever the command of that second: {worst}"
+    return f"{where} limits are exceeded: {worst}"
 
 
 def _is_safest(layer: SafetyLayer, run: "Trajectory", k: int) -> bool:

@@ -305,7 +305,7 @@ def decisions_with(altered, seconds: range, steps: int) -> list[Decision]:
         preview = source.preview(step)
         return altered(preview) if step in seconds else preview
 
-    ours.inputs._receive = receive
+    ours.inputs.receive = receive
     reference.planner.preview.receive = receive
     decisions = []
     for mine, its in compare(trip, ours, reference, steps):

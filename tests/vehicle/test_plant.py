@@ -50,7 +50,7 @@ def test_energy_is_conserved_in_every_step(soc, t_cl_degc, on, p_eng_w, demand, 
 )
 def test_states_stay_physical_whatever_is_asked(soc, t_cl_degc, command, demand, speed_mps):
     after, f = PLANT.step(PlantState(soc, t_cl_degc), command, demand, speed_mps)
-    assert -1e-12 <= after.soc <= 1.0 + 1e-12
+    assert 0.0 <= after.soc <= 1.0
     coldest = min(t_cl_degc, PLANT.vehicle.thermal.t_amb_degc)
     assert coldest - 1e-9 <= after.t_cl_degc <= BOILING_DEGC + 1e-9
     assert min(f.cabin_w, f.boiling_w) >= 0.0
