@@ -13,7 +13,7 @@ from qpmpc.controllers.settings import MhQpSettings, RuleBasedSettings
 from qpmpc.errors import InputError
 from qpmpc.preview import checked
 from qpmpc.pwa.model import PwaModel
-from qpmpc.qp import linearisation, rows, stage_qp
+from qpmpc.qp import coolant_floor, linearisation, rows, stage_qp
 from qpmpc.qp.quantities import pieces_of
 from qpmpc.qp.rows import Rows
 from qpmpc.qp.stage_qp import qp_parameters
@@ -39,7 +39,8 @@ CONSTANTS: dict[str, dict[str, float]] = {
         (monitor, "LONG_AGO_S LONGEST_GAP_S"),
         (checked, "LONGEST_STAGE_S NEWS"),
         (stage_qp, "LEAST_COST"),
-        (rows, "SHORTEST_SCALE_S REACH_MARGIN_SOC ACCURATE_STAGE_S SIGMA_FORCED"),
+        (coolant_floor, "USABLE"),
+        (rows, "SHORTEST_SCALE_S REACH_MARGIN_SOC ACCURATE_STAGE_S SIGMA_FORCED MOOT_G_PER_S"),
         (base, "LARGEST_PLAUSIBLE"),
         (demand, "GRAVITY_MPS2"),
     )

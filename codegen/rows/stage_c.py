@@ -7,7 +7,7 @@ from qpmpc.codegen.rows.c_text import Writer, wrapped
 from qpmpc.qp import rows
 from qpmpc.qp.coolant import radiator_w_per_k, thermostat_step
 from qpmpc.qp.expressions import is_number, names_in, parsed, targets_of
-from qpmpc.qp.quantities import ABOUT, INPUTS, ORIGIN, STAGE
+from qpmpc.qp.quantities import ABOUT, FLOOR, INPUTS, ORIGIN, STAGE
 from qpmpc.qp.rows import ROWS, VARIABLES, Entry, Row, Var
 from qpmpc.vehicle import heat
 
@@ -151,10 +151,11 @@ def types_h() -> str:
         ),
         struct("Bounds other than 0.", "mpc_stage_bounds", limits),
         struct(
-            "The road, duration 0 for a masked stage, which passes the state on at no cost; and\n"
-            " * the point about which the coolant's heat and the thermostat are expanded.",
+            "The road, duration 0 for a masked stage, which passes the state on at no cost; the\n"
+            " * point about which the coolant's heat and the thermostat are expanded; and the\n"
+            " * coolant's floor.",
             "mpc_stage_road",
-            (*STAGE, *(f"about_{name}" for name in ABOUT)),
+            (*STAGE, *(f"about_{name}" for name in ABOUT), FLOOR[0]),
         ),
         struct("Sums over the stages.", "mpc_stage_sums", _running()),
     )
@@ -174,7 +175,7 @@ def values_h(scalars: Iterable[str]) -> str:
     names = {name: f"mpc_par.{name}" for name in scalars}
     names |= {name: f"mpc_par.{name}[i]" for name in PIECES}
     names |= {name: f"road->{name}" for name in INPUTS}
-    names |= {name: f"state->{name}" for name in ORIGIN}
+    names |= {name: f"state->{name}" for name in (*ORIGIN, FLOOR[1])}
     names |= {name: name for name, value in vars(rows).items() if isinstance(value, float)}
     names |= {"start_soc": "REAL(0.0)", "is_last": "is_last"}
     return header(

@@ -78,6 +78,7 @@ typedef struct {
      * leave the digits of single precision to the changes within the plan. */
     mpc_real origin_soc;
     mpc_real origin_t_cl_degc;
+    mpc_real highest_floor_degc;      /* of any stage */
     mpc_real cost;                    /* of the solver, in units per g */
     mpc_real old_on_share[MPC_SHORT]; /* last usable plan */
     mpc_real old_p_eng_w[MPC_SHORT];

@@ -37,6 +37,7 @@ static void prepare(mpc_state *state)
         mpc_qp_move_origin(state, good->soc, good->t_cl_degc);
         mpc_qp_linearise_about_plan(state);
     }
+    mpc_floor_find(state, good->soc);
     mpc_qp_update(state);
     mpc_iterate_keep(state);
     mpc_iterate_to_solver_units(state);

@@ -64,7 +64,7 @@ class CvxpyTwin:
         self.vehicle, self.model, self.stages = vehicle, model, stages
         self.settings = settings or QpSettings()
         numbers = qp_parameters(vehicle, model, self.settings, ScalingSettings())
-        self._quantities = Quantities(numbers, vehicle.thermal, model, stages)
+        self._quantities = Quantities(numbers, vehicle, model, stages)
         self._parameters: list[tuple[Any, CodeType, int]] = []
         self.variables = {var: cp.Variable(stages, name=var.name.lower()) for var in Var}
         x = {var: UNIT[var] * variable for var, variable in self.variables.items()}

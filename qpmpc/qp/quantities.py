@@ -13,17 +13,19 @@ from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp import rows
 from qpmpc.qp.coolant import thermostat_step
+from qpmpc.qp.coolant_floor import CoolantFloor
 from qpmpc.qp.expressions import code_of, names_in, parsed, targets_of
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.vehicle import heat
-from qpmpc.vehicle.parameters import Thermal
+from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
 
 # Changing from step to step: a stage, the point it is expanded about, the state now.
 STAGE = ("duration_s", "net_w", "speed_mps", "internal_off_w")
 ABOUT = ("t_cl_degc", "fuel_g_per_s", "p_eng_w", "t_cl_start_degc", "t_cl_end_degc")
-INPUTS = (*STAGE, *(f"about_{name}" for name in ABOUT), "start_soc")
+FLOOR = ("floor_degc", "highest_floor_degc")
+INPUTS = (*STAGE, *(f"about_{name}" for name in ABOUT), "start_soc", *FLOOR)
 ORIGIN = ("origin_soc", "origin_t_cl_degc")
 
 
@@ -45,13 +47,15 @@ class Quantities:
     Parameters
     ----------
     parameters : numbers by name, see `qp_parameters`
-    thermal, model : of the coolant and of the PWA curves
+    vehicle, model : of the plant and of the PWA curves
     stages : n
     """
 
     def __init__(
-        self, parameters: Mapping[str, float], thermal: Thermal, model: PwaModel, stages: int
+        self, parameters: Mapping[str, float], vehicle: Vehicle, model: PwaModel, stages: int
     ) -> None:
+        thermal, least = vehicle.thermal, parameters["t_min_degc"]
+        self._floor = CoolantFloor(vehicle, parameters["battery_energy_j"], least)
         losses = heat.in_arithmetic(min=np.minimum, max=np.maximum)
         is_last = np.zeros((stages, 1))
         is_last[-1] = 1.0
@@ -92,7 +96,9 @@ class Quantities:
             names[name] = getattr(stages, name)[:, None]
         for name in ABOUT:
             names[f"about_{name}"] = getattr(about, name)[:, None]
-        names["start_soc"] = soc
+        floor = self._floor.at(stages, soc)
+        names["start_soc"], names["floor_degc"] = soc, floor[:, None]
+        names["highest_floor_degc"] = floor.max()
         exec(self._each_step, names)
         return names
 

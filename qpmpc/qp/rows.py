@@ -22,6 +22,7 @@ from qpmpc.qp.expressions import FormulaError, expression, terms_of
 SHORTEST_SCALE_S = 1.0  # a masked stage is scaled as one of 1 s
 REACH_MARGIN_SOC = 1e-5
 ACCURATE_STAGE_S = 1.0  # a stage of this length or less is known, a longer one is forecast
+MOOT_G_PER_S = 5.0  # a bound on fuel that is never met
 SIGMA_FORCED = 0.99  # "engine must be on" as a lower bound on sigma, kept apart from the upper one
 
 
@@ -61,6 +62,9 @@ QUANTITIES = """
 # power limits of the engine while on; what the battery alone cannot give
 most_w = min(engine_max_w, net_w + battery_charge_max_w)
 missing_w = net_w - battery_discharge_max_w
+
+# fuel above its curve would be heat without power: none where heat has to be had in good time
+waste_g_per_s = where(highest_floor_degc > t_min_degc, 0.0, MOOT_G_PER_S)
 
 # SOC limits with the reserve of forecast stages and the terminal band, no higher than charging all
 # the way leads to: a limit above that is moot
@@ -180,6 +184,7 @@ ROWS = (
         " + per_power * p_eng - per_fuel * fuel == settled_k",
     ),
     Row("fuel", "fuel - fuel_slope * p_eng - fuel_intercept * on >= 0.0", "fuel"),
+    Row("fuel_most", "fuel - fuel_chord_g_per_j * p_eng - fuel_idle_g_per_s * on <= waste_g_per_s"),
     Row(
         "battery",
         "internal + battery_slope * p_eng"
@@ -190,7 +195,7 @@ ROWS = (
     Row("p_eng_min", "p_eng - engine_min_w * on >= max(missing_w - engine_min_w, 0.0)"),
     Row("box_soc", "soc_low <= soc <= soc_high"),
     Row("box_on", "where(missing_w > 0.0, SIGMA_FORCED, 0.0) <= on <= 1.0"),
-    Row("t_cl_min", "t_cl + t_slack >= t_min_degc - origin_t_cl_degc"),
+    Row("t_cl_min", "t_cl + t_slack >= floor_degc - origin_t_cl_degc"),
     Row("t_cl_max", "t_cl - t_slack <= t_max_degc - origin_t_cl_degc"),
     Row("box_slack", "t_slack >= 0.0"),
 )

@@ -93,10 +93,17 @@ def qp_parameters(
             f"soc_max={battery.soc_max:g}, leave no terminal SOC: {soc_low:g} is above "
             f"{soc_high:g}"
         )
+    # the chord of the fuel curve, from idling to full power
+    idle, full = (
+        float((model.fuel.slope * power + model.fuel.intercept).max())
+        for power in (0.0, engine.power_max_w)
+    )
     return {
         "engine_max_w": engine.power_max_w,
         "engine_min_w": engine.power_min_w,
         "lhv_j_per_g": engine.lhv_j_per_g,
+        "fuel_idle_g_per_s": idle,
+        "fuel_chord_g_per_j": (full - idle) / engine.power_max_w,
         **{name: float(value) for name, value in thermal.model_dump().items()},
         "battery_energy_j": model.battery_energy_j,
         "battery_discharge_max_w": battery.power_discharge_max_w,
@@ -148,7 +155,7 @@ class StageQp:
         self.structure = QpStructure(stages, self.rows)
         self.stages = stages
         parameters = qp_parameters(vehicle, model, settings, scaling)
-        self._quantities = Quantities(parameters, vehicle.thermal, model, stages)
+        self._quantities = Quantities(parameters, vehicle, model, stages)
         self._values = np.empty((stages, len(self.structure.index)))
         self._lower = np.full((stages, self.rows.count), -np.inf)
         self._upper = np.full((stages, self.rows.count), np.inf)

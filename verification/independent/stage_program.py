@@ -184,6 +184,37 @@ def _heat_reserve_k(equations: Equations) -> float:
     return min(max(lost_k, 0.0), (th.t_cl_max_degc - least) / 2.0)
 
 
+def _coolant_floor_degc(
+    equations: Equations, road: Horizon, soc: float, coldest: float, energy_j: float
+) -> Floats:
+    """Coolant needed at the end of each stage, because later the battery will be full.
+
+    Forwards the battery as empty as the trip ahead allows, for it takes what the engine makes;
+    backwards the coolant that is lost beyond the engine's largest heat.
+    """
+    car, n = equations.vehicle, len(road.h)
+    cell, engine, th = car.battery, car.engine, car.thermal
+    charge, gain = min(max(soc, cell.soc_min), cell.soc_max), np.zeros(n)
+    for k in range(n):
+        h, net = float(road.h[k]), float(road.net_w[k])
+        share = 1.0 - min(max(-net, 0.0), cell.power_charge_max_w) / cell.power_charge_max_w
+        taken_w = 0.5 * (cell.soc_max - charge) * energy_j * share / max(h, 1.0)
+        shaft = max(net, cell.aux_power_w) + min(taken_w, cell.power_charge_max_w)
+        shaft = min(max(shaft, engine.power_min_w), engine.power_max_w)
+        burnt = float(equations.alpha(th.t_cl_min_degc) * equations.fuel_g_per_s(shaft)[0])
+        kept = (1.0 - th.exhaust_share) * (burnt * equations.lhv_j_per_g - shaft)
+        gain[k] = h * kept / th.heat_capacity_j_per_k
+        charge = min(max(charge - h * float(road.off_w[k]) / energy_j, cell.soc_min), cell.soc_max)
+    floor = np.full(n, coldest)
+    most = max(coldest, (th.t_cl_min_degc + th.t_cl_max_degc) / 2.0)
+    for k in range(n - 1, 0, -1):
+        air = float(equations.ua_w_per_k(road.speed_mps[k])) * (floor[k] - th.t_amb_degc)
+        rest = float(equations.cabin_w(floor[k]) + equations.radiator_w(floor[k]))
+        lost = float(road.h[k]) * (air + rest) / th.heat_capacity_j_per_k
+        floor[k - 1] = min(max(coldest, floor[k] + lost - gain[k]), most)
+    return floor
+
+
 def stage_program(
     vehicle: Vehicle,
     curves: Curves,
@@ -201,6 +232,13 @@ def stage_program(
     energy = float(equations.voltage_v(vehicle.trip.soc_init)) * 3600.0 * battery.capacity_ah
     lhv, share = equations.lhv_j_per_g, 1.0 - th.exhaust_share
     reach = state[0]
+    coldest = th.t_cl_min_degc + qp.t_cl_margin_k + _heat_reserve_k(equations)
+    floor = _coolant_floor_degc(equations, road, state[0], coldest, energy)
+    on_curve = [
+        float(np.max(curves.fuel.slope * p + curves.fuel.intercept))
+        for p in (0.0, engine.power_max_w)
+    ]
+    per_w = (on_curve[1] - on_curve[0]) / engine.power_max_w
     for k in range(n):
         h, net, off = float(road.h[k]), float(road.net_w[k]), float(road.off_w[k])
         t0, f0, e0, begin, end = (float(part[k]) for part in about)
@@ -248,6 +286,9 @@ def stage_program(
 
         for a, b in zip(curves.fuel.slope, curves.fuel.intercept, strict=True):
             rows.add("fuel piece", 0.0, {at[FUEL]: -1.0, at[P_ENG]: a, at[ON]: b})
+        # no fuel above the chord of its curve where heat is needed in good time
+        wasted = 0.0 if floor.max() > coldest else 5.0
+        rows.add("fuel most", wasted, {at[FUEL]: 1.0, at[P_ENG]: -per_w, at[ON]: -on_curve[0]})
         for c, d in zip(curves.battery.slope, curves.battery.intercept, strict=True):
             # sigma l((sigma P0 - E)/sigma) + (1 - sigma) l(P0) <= G
             terms = {at[INTERNAL]: -1.0, at[P_ENG]: -c, at[ON]: c * net + d - off}
@@ -273,8 +314,7 @@ def stage_program(
             high = min(qp.terminal_high * vehicle.trip.soc_init, high)
         rows.add("SOC max", high, {at[SOC]: 1.0})
         rows.add("SOC min", -min(low, reach - 1e-5), {at[SOC]: -1.0})
-        coldest = th.t_cl_min_degc + qp.t_cl_margin_k + _heat_reserve_k(equations)
-        rows.add("coolant min", -coldest, {at[T_CL]: -1.0, at[T_SLACK]: -1.0})
+        rows.add("coolant min", -float(floor[k]), {at[T_CL]: -1.0, at[T_SLACK]: -1.0})
         rows.add("coolant max", th.t_cl_max_degc - 0.05, {at[T_CL]: 1.0, at[T_SLACK]: -1.0})
         rows.add("slack", 0.0, {at[T_SLACK]: -1.0})
     return StageProgram(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.preview.stages import Stages
+from qpmpc.qp.coolant_floor import CoolantFloor
 from qpmpc.qp.heat_reserve import heat_reserve_k
 from qpmpc.qp.rows import ACCURATE_STAGE_S, SIGMA_FORCED, Var
 from qpmpc.qp.stage_qp import T_CL_MAX_MARGIN_K, QpSettings
@@ -36,6 +37,7 @@ NLP_VARS = len(NlpVar)
 UNIT = np.array([0.01, 1.0, 10e3, 1.0, 1.0])
 
 SOC_ROW = 2  # of the rows of a stage, the limit that may have to give way
+T_CL_ROW = 3  # the lower limit of the coolant, which the trip ahead may raise
 SIGMA_LEAST = 1e-4  # keeps the power of an engine that is off at its best value
 SOC_SHORTFALL_G = 5000.0  # price of a unit of SOC missed, over ten times its worth in fuel
 WASTE_G = 0.01  # price of 0.01 of SOC thrown away, far below its worth: keeps SOC determined
@@ -129,6 +131,10 @@ class NlpProblem:
             "g": ca.vec(rows),
         }
         self._row_lower, self._row_upper = self._row_bounds()
+        energy_j = BatteryMaps(self.vehicle.battery).energy_j(trip.soc_init)
+        least = self.vehicle.thermal.t_cl_min_degc + self.settings.t_cl_margin_k
+        least += heat_reserve_k(self.vehicle)
+        self._floor = CoolantFloor(self.vehicle, energy_j, least)
 
     def _stage(self, thermostat_steps: int) -> Any:
         """One stage: (SOC and T before, variables, road) -> fuel g, SOC surplus, coolant gap."""
@@ -172,11 +178,10 @@ class NlpProblem:
         return t_cl_degc
 
     def _row_bounds(self) -> tuple[Floats, Floats]:
-        """Bounds of the rows, except the lower limits of SOC, which change."""
-        thermal, settings = self.vehicle.thermal, self.settings
+        """Bounds of the rows, except the lower limits of SOC and coolant, which change."""
+        thermal = self.vehicle.thermal
         lower, upper = np.full((self.stages, 6), -np.inf), np.full((self.stages, 6), np.inf)
         lower[:, [0, 1, 5]], upper[:, 1] = 0.0, 0.0
-        lower[:, 3] = thermal.t_cl_min_degc + settings.t_cl_margin_k + heat_reserve_k(self.vehicle)
         upper[:, 4] = thermal.t_cl_max_degc - T_CL_MAX_MARGIN_K
         return lower, upper
 
@@ -210,6 +215,7 @@ class NlpProblem:
         )
         row_lower = self._row_lower.copy()
         row_lower[:, SOC_ROW] = self._soc_low(stages, soc) / UNIT[NlpVar.SOC]
+        row_lower[:, T_CL_ROW] = self._floor.at(stages, soc)
         return NlpData(
             power_least_w=least,
             parameters=np.concatenate([road.ravel(order="F"), [soc, t_cl_degc]]),

@@ -111,12 +111,13 @@ def _told(seen: Observation, rng: np.random.Generator) -> tuple[Observation, int
     kind = rng.random()
     if kind < 0.2:
         step += int(rng.choice([-1, -1, 1, 5, 30, -1000, 10**6]))
+    changed: dict[str, float] = {}
     for name in rng.choice(SIGNALS, rng.integers(0, 3), replace=False):
         value = float(rng.choice(NUMBERS))
         if rng.random() < 0.5:
             value = getattr(seen, str(name)) * (1.0 + 0.1 * rng.normal())
-        seen = seen._replace(**{str(name): value})
-    return seen._replace(step=step), step
+        changed[str(name)] = value
+    return Observation(**{**seen._asdict(), **changed, "step": step}), step
 
 
 def _spoilt(preview: Preview, rng: np.random.Generator) -> Preview:
