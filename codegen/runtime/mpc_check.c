@@ -35,6 +35,9 @@ int32_t mpc_check_state(const mpc_state *state)
     fine &= is_count(state->failures, FAILURES_FORGIVEN) & is_count(state->is_under_way, 1);
     fine &= is_count(state->depart_linearisation, MPC_DEPARTURE_LINEARISATIONS);
     fine &= is_count(state->depart_left, MPC_DEPARTURE_ITERATIONS);
+    if (state->phase == MPC_PHASE_DEPARTING) {
+        fine &= within(state->cost, LEAST_COST, REAL(1.0) / LEAST_COST);
+    }
     fine &= is_count(rules->power_request, 1) & is_count(rules->heat_request, 1);
     fine &= is_count(rules->on_for_s, mpc_par.rule_min_on_s);
     fine &= is_count(watch->soc_since_s, LONG_AGO_S) & is_count(watch->t_cl_since_s, LONG_AGO_S);

@@ -73,7 +73,8 @@ static void depart_slice(mpc_state *state, const mpc_in *in)
         count = ((MPC_DEPARTURE_ITERATIONS - 1) % MPC_ITERATIONS) + 1;
     }
     const int32_t solved = mpc_solver_iterate(state, count);
-    state->depart_left = (solved != 0) ? (state->depart_left - count) : 0;
+    const int32_t goes_on = ((solved != 0) && (state->depart_left > count)) ? 1 : 0;
+    state->depart_left = (goes_on != 0) ? (state->depart_left - count) : 0;
     if (state->depart_left == 0) {
         state->depart_linearisation++;
         if (conclude(state, solved) == 0) {
@@ -138,7 +139,7 @@ static int32_t take_preview(mpc_state *state, const mpc_in *in, int32_t passed, 
         state->road_age = 0;
     } else {
         *flags |= MPC_BAD_PREVIEW;
-        if ((state->road_age + passed) < MPC_SHORT) {
+        if (((state->road_age + passed) < MPC_SHORT) && (mpc_preview_check_kept(state) != 0)) {
             mpc_qp_road_move_up(state, passed);
             state->road_age += passed;
         } else {
