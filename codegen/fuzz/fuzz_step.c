@@ -11,13 +11,14 @@
 #include <string.h>
 
 #include "drive.h"
+#include "mpc_constants.h"
 #include "mpc_model.h"
 #include "promises.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-/* After bad memory or a failure, then a cold start, all is well. */
-#define QUIET_S (3 + MPC_WARM_UP_STEPS)
+/* A wrong number of the solver is noticed, failures are forgiven, it starts cold: then all is well. */
+#define QUIET_S (4 + FAILURES_FORGIVEN + MPC_WARM_UP_STEPS)
 /* Until the truth is within reach of whatever may have been believed. */
 #define LONG_S 150
 
