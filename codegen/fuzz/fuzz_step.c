@@ -131,12 +131,12 @@ static void attack_preview(source *from)
 static void attack_inputs(source *from)
 {
     const size_t at = below(from, sizeof in);
-    size_t count = below(from, 64);
-    count = (count < sizeof in - at) ? count : sizeof in - at;
-    count = (count < from->left) ? count : from->left;
-    memcpy((uint8_t *)&in + at, from->at, count);
-    from->at += count;
-    from->left -= count;
+    size_t length = below(from, 64);
+    length = (length < sizeof in - at) ? length : sizeof in - at;
+    length = (length < from->left) ? length : from->left;
+    memcpy((uint8_t *)&in + at, from->at, length);
+    from->at += length;
+    from->left -= length;
 }
 
 /* One attack; returns for how long its traces may be seen. */
