@@ -37,6 +37,7 @@ void take_road(drive *of, source *from)
     of->road.speed_mps = of->speed_mps;
     of->road.steps = (int32_t)steps;
     (void)mpc_forecast_start(&of->forecast, &of->road);
+    of->is_wild = (style < 6) ? 0 : 1;
     of->place = 0;
     of->clock_s = 0;
 }

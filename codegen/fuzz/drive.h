@@ -14,6 +14,7 @@ typedef struct {
     mpc_road road;
     mpc_forecast forecast;
     second_start car;
+    int32_t is_wild; /* the road demands more than engine and battery give */
     int32_t place;   /* seconds of the trip driven */
     int32_t clock_s; /* its clock is ahead by */
 } drive;

@@ -3,8 +3,9 @@
  * Bytes become trips with a forecast, a clock, and a car that moves as commanded; in some seconds
  * numbers, clock, preview or memory are attacked. After every step: the command is finite and in
  * range, the status is declared, no other command would exceed the limits of the second by less,
- * and after some quiet seconds all is well again. Built with libFuzzer, or with -DFUZZ_MAIN as a
- * program that makes its own bytes and counts what it has reached: fuzz_step SEED STEPS.
+ * and after some quiet seconds of a road that the car can follow all is well again. Built with
+ * libFuzzer, or with -DFUZZ_MAIN as a program that makes its own bytes and counts what it has
+ * reached: fuzz_step SEED STEPS.
  */
 #include <stdio.h>
 #include <stdlib.h>
@@ -239,7 +240,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             }
             memset(&out, 0xff, sizeof out);
             check_promises(&state, &in, &out, mpc_step(&state, &in, &out));
-            require(quiet_s < QUIET_S || out.flags == 0, "all was well, and a flag", &state, &out);
+            require(quiet_s < QUIET_S || trip.is_wild || out.flags == 0, "all was well, and a flag",
+                    &state, &out);
             count();
             move(&trip, &out, 1);
         }
