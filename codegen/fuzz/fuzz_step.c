@@ -1,129 +1,273 @@
-/* Any bytes in -> a finite, in-range command and a declared status.
+/* Seconds of a simulated car, plausible and hostile, against the promises of mpc_step.
  *
- * The bytes are read as a sequence of calls: one byte selects mpc_init, mpc_depart or mpc_step, the
- * following ones are copied over the inputs or set one number of them; the others are unchanged. So
- * inputs near sensible ones occur as well as nonsense. Built with libFuzzer, or with -DFUZZ_MAIN as
- * a program that makes its own bytes: fuzz_step SEED RUNS.
+ * Bytes become trips with a forecast, a clock, and a car that moves as commanded; in some seconds
+ * numbers, clock, preview or memory are attacked. After every step: the command is finite and in
+ * range, the status is declared, no other command would exceed the limits of the second by less,
+ * and after some quiet seconds of a road that the car can follow all is well again. Built with
+ * libFuzzer, or with -DFUZZ_MAIN as a program that makes its own bytes and counts what it has
+ * reached: fuzz_step SEED STEPS.
  */
-#include <stddef.h>
-#include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "mpc.h"
+#include "drive.h"
+#include "mpc_constants.h"
 #include "mpc_model.h"
+#include "promises.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-static void check(const mpc_in *in, const mpc_out *out, int32_t flags)
+/* A wrong number of the solver is noticed, failures are forgiven, it starts cold: then all is well. */
+#define QUIET_S (4 + FAILURES_FORGIVEN + MPC_WARM_UP_STEPS)
+/* Until the truth is within reach of whatever may have been believed. */
+#define LONG_S 150
+
+static struct {
+    long steps;
+    long solved; /* steps with iterations of the solver */
+    long rung[3];
+    long flag[FLAGS];
+} reached;
+
+static mpc_state state;
+static drive trip;
+static int32_t quiet_s; /* since the last attack */
+static int32_t blind_s; /* no preview for */
+static mpc_in in;
+static mpc_out out;
+
+static void count(void)
 {
-    const int32_t all = MPC_BAD_MEASUREMENT | MPC_BAD_PREVIEW | MPC_SOLVER_FAILED | MPC_WARMING_UP;
-    int fine = 1;
-    (void)in;
-    fine &= (out->engine_on == 0) || (out->engine_on == 1);
-    fine &= (out->p_eng_w >= (mpc_real)0) && (out->p_eng_w <= mpc_par.engine_max_w);
-    fine &= (out->engine_on == 1) || !(out->p_eng_w > (mpc_real)0);
-    fine &= (out->engine_on == 0) || (out->p_eng_w >= mpc_par.engine_min_w);
-    fine &= (out->rung >= MPC_OPTIMISED) && (out->rung <= MPC_RULES);
-    fine &= (out->flags == flags) && ((flags & ~all) == 0);
-    fine &= (out->rung != MPC_OPTIMISED) || (flags == 0);
-    fine &= (out->on_share * (mpc_real)0 == (mpc_real)0); /* neither infinite nor NaN */
-    fine &= (out->relaxation_gap * (mpc_real)0 == (mpc_real)0);
-    if (!fine) {
-        abort();
+    reached.steps++;
+    reached.solved += out.iterations > 0;
+    reached.rung[out.rung]++;
+    for (int i = 0; i < FLAGS; i++) {
+        reached.flag[i] += (out.flags >> i) & 1;
     }
 }
 
-static void sensible(mpc_in *in)
+/* A trip starts, with a departure or part of one, or without. */
+static void start(source *from)
 {
-    memset(in, 0, sizeof(*in));
-    in->soc = (mpc_real)0.6;
-    in->t_cl_degc = (mpc_real)50;
-    in->demand_w = (mpc_real)5000;
-    in->speed_mps = (mpc_real)10;
-    in->short_count = MPC_SHORT;
-    for (int k = 0; k < MPC_SHORT; k++) {
-        in->short_demand_w[k] = (mpc_real)5000;
-        in->short_speed_mps[k] = (mpc_real)10;
+    take_road(&trip, from);
+    if (below(from, 2)) {
+        place_car(&trip, from);
     }
-    for (int k = 0; k < MPC_LONG; k++) {
-        in->long_duration_s[k] = (mpc_real)30;
-        in->long_net_w[k] = (mpc_real)4000;
-        in->long_speed_mps[k] = (mpc_real)10;
-        in->long_internal_off_w[k] = (mpc_real)4100;
+    mpc_init(&state);
+    measure(&trip, &in);
+    for (uint32_t slice = below(from, 4); slice > 0; slice--) {
+        const int32_t left = mpc_depart(&state, &in);
+        require(left == 0 || left == 1, "departure refused", &state, &out);
+    }
+    quiet_s = 0;
+    blind_s = 0;
+}
+
+static void poke(source *from)
+{
+    const size_t word = below(from, sizeof state / sizeof(mpc_real));
+    const mpc_real number = hostile(from);
+    uint8_t *const bytes = (uint8_t *)&state;
+    if (below(from, 2)) {
+        memcpy(&bytes[word * sizeof number], &number, sizeof number);
+    } else {
+        bytes[word * sizeof number + below(from, sizeof number)] ^= (uint8_t)(1u << below(from, 8));
     }
 }
 
-/* One number of the inputs: mostly allowed values, at the edges too. */
-static void set_real(mpc_in *in, size_t at, uint8_t choice)
+static void fill(void *memory, size_t size, source *from)
 {
-    static const mpc_real values[] = {
-        (mpc_real)0,    (mpc_real)1,     (mpc_real)-1,   (mpc_real)0.4, (mpc_real)0.6,
-        (mpc_real)0.8,  (mpc_real)1e-30, (mpc_real)1e-3, (mpc_real)5,   (mpc_real)30,
-        (mpc_real)90,   (mpc_real)120,   (mpc_real)150,  (mpc_real)-60, (mpc_real)1e3,
-        (mpc_real)-3e4, (mpc_real)2.7e4, (mpc_real)7e4,  (mpc_real)1e5, (mpc_real)-1e5,
-        (mpc_real)1e6,  (mpc_real)-1e6,  (mpc_real)1e9,  (mpc_real)1e38};
-    const size_t offset = at - (at % sizeof(mpc_real));
-    const mpc_real value = values[choice % (sizeof(values) / sizeof(values[0]))];
-    if (offset < offsetof(mpc_in, short_count)) {
-        memcpy((uint8_t *)in + offset, &value, sizeof(value));
+    static const uint8_t values[] = {0, 0xFF, 0x55};
+    const uint32_t kind = below(from, 4);
+    uint64_t random = bits(from);
+    if (kind < 3) {
+        memset(memory, values[kind], size);
+    } else {
+        make_bytes(memory, size, &random);
     }
+}
+
+static void attack_memory(source *from)
+{
+    if (below(from, 2)) {
+        fill(&state, sizeof state, from);
+        require(mpc_depart(&state, &in) == -1, "a departure from bad memory", &state, &out);
+    } else {
+        const int32_t now = in.second;
+        fill(&trip.forecast, sizeof trip.forecast, from);
+        require(mpc_in_from_forecast(&trip.forecast, trip.place, &in) == -1
+                    && mpc_in_from_preview(&trip.forecast, trip.place, &trip.road, &in) == -1,
+                "a preview from bad memory", &state, &out);
+        in.second = now;
+        (void)mpc_forecast_start(&trip.forecast, &trip.road);
+    }
+}
+
+/* The clock jumps, for good. */
+static void attack_clock(source *from)
+{
+    const uint32_t ahead = (uint32_t)trip.clock_s;
+    trip.clock_s = (int32_t)(below(from, 2) ? ahead - below(from, 40) : bits(from));
+    measure(&trip, &in);
+}
+
+static void attack_preview(source *from)
+{
+    const mpc_real wild_w[] = {mpc_par.can_net_min_w, 0, mpc_par.can_net_max_w};
+    const uint32_t first = below(from, 3);
+    const uint32_t turn = below(from, 3);
+    for (uint32_t k = 0; k < MPC_SHORT; k++) {
+        in.short_demand_w[k] = wild_w[(first + k * turn) % 3];
+        in.short_speed_mps[k] = (k % 2) ? mpc_par.can_speed_max_mps : 0;
+    }
+    for (uint32_t k = 0; k < MPC_LONG; k++) {
+        in.long_duration_s[k] = (mpc_real)between(from, 0, 3000);
+        in.long_net_w[k] = wild_w[(first + k * turn) % 3];
+        in.long_internal_off_w[k] = (k % 2) ? mpc_par.can_internal_min_w
+                                            : mpc_par.can_internal_max_w;
+    }
+}
+
+static void attack_inputs(source *from)
+{
+    const size_t at = below(from, sizeof in);
+    size_t length = below(from, 64);
+    length = (length < sizeof in - at) ? length : sizeof in - at;
+    length = (length < from->left) ? length : from->left;
+    memcpy((uint8_t *)&in + at, from->at, length);
+    from->at += length;
+    from->left -= length;
+}
+
+/* One attack; returns for how long its traces may be seen. */
+static int32_t attack(source *from)
+{
+    int32_t traces_s = 0;
+    mpc_real *const numbers = (mpc_real *)&in;
+    switch (below(from, 16)) {
+    case 0: /* one of the measurements */
+        numbers[below(from, 4)] = hostile(from);
+        traces_s = LONG_S;
+        break;
+    case 1:
+        in.soc += (mpc_real)between(from, -0.02, 0.02);
+        in.t_cl_degc += (mpc_real)between(from, -4, 4);
+        traces_s = LONG_S;
+        break;
+    case 2: /* any number */
+        numbers[below(from, offsetof(mpc_in, short_count) / sizeof in.soc)] = hostile(from);
+        traces_s = LONG_S;
+        break;
+    case 3:
+        attack_inputs(from);
+        traces_s = LONG_S;
+        break;
+    case 4:
+        in.short_count = (int32_t)bits(from);
+        blind_s = below(from, 2) ? (int32_t)below(from, 2 * MPC_SHORT) : 0;
+        traces_s = blind_s;
+        break;
+    case 5:
+        in.engine_on = below(from, 2) ? 1 - trip.car.engine_on : (int32_t)bits(from);
+        break;
+    case 6:
+        attack_clock(from);
+        break;
+    case 7: /* seconds are missed */
+        move(&trip, &out, (int32_t)below(from, 26));
+        if (has_arrived(&trip)) {
+            start(from);
+        }
+        measure(&trip, &in);
+        traces_s = LONG_S;
+        break;
+    case 8: /* this second again */
+        trip.place -= (trip.place > 0) ? 1 : 0;
+        measure(&trip, &in);
+        break;
+    case 9:
+        attack_preview(from);
+        break;
+    case 10: /* a new route under way */
+        take_road(&trip, from);
+        trip.clock_s = in.second;
+        measure(&trip, &in);
+        break;
+    case 11:
+        place_car(&trip, from);
+        measure(&trip, &in);
+        traces_s = LONG_S;
+        break;
+    case 12:
+        start(from);
+        break;
+    case 13: /* the solver's numbers */
+        state.stage[below(from, MPC_STAGES)].x[below(from, MPC_VARS)] = hostile(from);
+        break;
+    case 14:
+        poke(from);
+        traces_s = LONG_S;
+        break;
+    default:
+        attack_memory(from);
+        break;
+    }
+    return traces_s;
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    static mpc_state state;
-    mpc_in in;
-    mpc_out out;
-    mpc_init(&state);
-    sensible(&in);
-    while (size > 3) {
-        const uint8_t call = data[0];
-        const size_t at = ((size_t)data[1] * 256u + data[2]) % sizeof(in);
-        size_t count = data[3] % 64u;
-        data += 4;
-        size -= 4;
-        count = (count < size) ? count : size;
-        count = (count < sizeof(in) - at) ? count : (sizeof(in) - at);
-        if ((call & 1u) == 0u) {
-            memcpy((uint8_t *)&in + at, data, count);
-        } else {
-            set_real(&in, at, (count > 0) ? data[0] : 0u);
-        }
-        data += count;
-        size -= count;
-        if (call < 8) {
-            mpc_init(&state);
-            sensible(&in);
-        } else if (call < 24) {
-            (void)mpc_depart(&state, &in);
-        } else {
-            memset(&out, 0xff, sizeof(out));
-            check(&in, &out, mpc_step(&state, &in, &out));
+    source from = {data, size};
+    place_car(&trip, &from);
+    start(&from);
+    while (from.left > 0) {
+        const uint32_t next = below(&from, 256);
+        const int32_t calm_s = (next < 16) ? 2 * (int32_t)next : 0; /* none of them attacked */
+        for (int32_t k = 0; k <= calm_s; k++) {
+            if (has_arrived(&trip)) {
+                start(&from);
+            }
+            measure(&trip, &in);
+            quiet_s++;
+            if (blind_s > 0) {
+                blind_s--;
+                in.short_count = 0;
+            }
+            if (next >= 128) {
+                const int32_t until_s = -attack(&from);
+                quiet_s = (quiet_s < until_s) ? quiet_s : until_s;
+            }
+            memset(&out, 0xff, sizeof out);
+            check_promises(&state, &in, &out, mpc_step(&state, &in, &out));
+            require(quiet_s < QUIET_S || trip.is_wild || out.flags == 0, "all was well, and a flag",
+                    &state, &out);
+            count();
+            move(&trip, &out, 1);
         }
     }
     return 0;
 }
 
 #ifdef FUZZ_MAIN
-#include <stdio.h>
-
 int main(int argc, char **argv)
 {
     if (argc != 3) {
         return 2;
     }
     uint64_t random = strtoull(argv[1], NULL, 10) * 2u + 1u;
-    const long runs = strtol(argv[2], NULL, 10);
+    const long steps = strtol(argv[2], NULL, 10);
     static uint8_t bytes[2048];
-    for (long run = 0; run < runs; run++) {
-        for (size_t i = 0; i < sizeof(bytes); i++) {
-            random = random * 6364136223846793005u + 1442695040888963407u;
-            bytes[i] = (uint8_t)(random >> 56);
-        }
-        (void)LLVMFuzzerTestOneInput(bytes, sizeof(bytes));
+    while (reached.steps < steps) {
+        make_bytes(bytes, sizeof bytes, &random);
+        (void)LLVMFuzzerTestOneInput(bytes, sizeof bytes);
     }
-    printf("%ld runs\n", runs);
+    printf("{\"steps\": %ld, \"solved\": %ld, \"rungs\": [%ld, %ld, %ld], \"flags\": [",
+           reached.steps, reached.solved, reached.rung[0], reached.rung[1], reached.rung[2]);
+    for (int i = 0; i < FLAGS; i++) {
+        printf("%s%ld", i ? ", " : "", reached.flag[i]);
+    }
+    printf("]}\n");
     return 0;
 }
 #endif

@@ -35,6 +35,9 @@ int32_t mpc_check_state(const mpc_state *state)
     fine &= is_count(state->failures, FAILURES_FORGIVEN) & is_count(state->is_under_way, 1);
     fine &= is_count(state->depart_linearisation, MPC_DEPARTURE_LINEARISATIONS);
     fine &= is_count(state->depart_left, MPC_DEPARTURE_ITERATIONS);
+    if (state->phase == MPC_PHASE_DEPARTING) {
+        fine &= within(state->cost, LEAST_COST, REAL(1.0) / LEAST_COST);
+    }
     fine &= is_count(rules->power_request, 1) & is_count(rules->heat_request, 1);
     fine &= is_count(rules->on_for_s, mpc_par.rule_min_on_s);
     fine &= is_count(watch->soc_since_s, LONG_AGO_S) & is_count(watch->t_cl_since_s, LONG_AGO_S);
@@ -87,7 +90,8 @@ static void predict(const mpc_watch *watch, mpc_real *soc, mpc_real *t_cl_degc)
 static int32_t take(mpc_real *good, mpc_real value, mpc_real expected, mpc_real per_s,
                     int32_t *since_s)
 {
-    const mpc_real reach = per_s * (mpc_real)(*since_s + 1);
+    const int32_t reach_s = *since_s + 1;
+    const mpc_real reach = per_s * (mpc_real)reach_s;
     const int32_t fine = within(value, expected - reach, expected + reach);
     *good = (fine != 0) ? value : expected;
     *since_s = (fine != 0) ? 0 : *since_s;
@@ -96,7 +100,8 @@ static int32_t take(mpc_real *good, mpc_real value, mpc_real expected, mpc_real 
 
 static int32_t later(int32_t since_s, int32_t passed_s)
 {
-    return (since_s < (LONG_AGO_S - passed_s)) ? (since_s + passed_s) : LONG_AGO_S;
+    const int32_t sum_s = since_s + passed_s;
+    return (sum_s < LONG_AGO_S) ? sum_s : LONG_AGO_S;
 }
 
 int32_t mpc_check_measured(mpc_watch *watch, const mpc_in *in, int32_t *elapsed)

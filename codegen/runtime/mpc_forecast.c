@@ -77,6 +77,8 @@ static int32_t is_believable(const mpc_road *trip)
 int32_t mpc_forecast_start(mpc_forecast *forecast, const mpc_road *trip)
 {
     const int32_t fine = is_believable(trip);
+    forecast->magic = MPC_MAGIC;
+    forecast->magic_end = MPC_MAGIC;
     forecast->trip = *trip;
     if (fine == 0) {
         forecast->trip.steps = 0;
@@ -92,6 +94,18 @@ int32_t mpc_forecast_start(mpc_forecast *forecast, const mpc_road *trip)
     forecast->covered = (steps < held) ? steps : held;
     sum_up(forecast);
     return (fine != 0) ? 0 : -1;
+}
+
+/* Whether the memory is that of a forecast: no index from it leaves the trip or the blocks. */
+static int32_t is_started(const mpc_forecast *forecast)
+{
+    const mpc_road *const trip = &forecast->trip;
+    int32_t fine = ((forecast->magic == MPC_MAGIC) && (forecast->magic_end == MPC_MAGIC)) ? 1 : 0;
+    fine &= ((trip->steps >= 0) && (trip->steps <= MPC_LONGEST_TRIP_S)) ? 1 : 0;
+    fine &= ((forecast->covered >= 0) && (forecast->covered <= trip->steps)) ? 1 : 0;
+    fine &= ((forecast->next >= 0) && (forecast->next <= forecast->covered)) ? 1 : 0;
+    fine &= ((forecast->block_s >= 0) && (forecast->block_s <= MPC_LONGEST_TRIP_S)) ? 1 : 0;
+    return ((fine != 0) && (forecast->covered <= (forecast->block_s * MPC_BLOCKS))) ? 1 : 0;
 }
 
 /* Keep in the sums only the seconds from `from` on. */
@@ -137,7 +151,8 @@ static void fill_long(const mpc_forecast *forecast, int32_t is_arriving, mpc_in 
 /* Apart from mpc_in_from_preview, which nothing in this file may call alone (MISRA C:2012 8.7). */
 static int32_t fill(mpc_forecast *forecast, int32_t step, const mpc_road *seen, mpc_in *in)
 {
-    const int32_t is_under_way = ((step >= 0) && (seen->steps > 0)) ? 1 : 0;
+    const int32_t is_ahead = ((step >= 0) && (seen->steps > 0)) ? 1 : 0;
+    const int32_t is_under_way = is_ahead & is_started(forecast);
     const int32_t ahead = (is_under_way != 0) ? seen->steps : 0;
     const int32_t is_arriving = (ahead <= MPC_SHORT) ? 1 : 0;
     in->short_count = (is_arriving != 0) ? ahead : MPC_SHORT;
@@ -154,7 +169,8 @@ static int32_t fill(mpc_forecast *forecast, int32_t step, const mpc_road *seen, 
 int32_t mpc_in_from_forecast(mpc_forecast *forecast, int32_t step, mpc_in *in)
 {
     const mpc_road *const trip = &forecast->trip;
-    const int32_t is_under_way = ((step >= 0) && (step < trip->steps)) ? 1 : 0;
+    const int32_t is_ahead = ((step >= 0) && (step < trip->steps)) ? 1 : 0;
+    const int32_t is_under_way = is_ahead & is_started(forecast);
     const int32_t from = (is_under_way != 0) ? step : 0;
     mpc_road seen = *trip;
     seen.steps = (is_under_way != 0) ? (trip->steps - from) : 0;

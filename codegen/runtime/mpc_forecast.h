@@ -45,11 +45,13 @@ typedef struct {
 
 /* Memory of one forecast. Its contents are private; the caller needs only its size. */
 typedef struct {
+    uint32_t magic; /* tells a started forecast from any other memory, as does magic_end */
     mpc_road trip;
     int32_t block_s;
     int32_t covered; /* seconds of the trip in the blocks */
     int32_t next;    /* first second that is still in the sums */
     mpc_class_sums ahead[MPC_LONG];
+    uint32_t magic_end;
 } mpc_forecast;
 
 /* Take a forecast of the whole trip, from departure to arrival; its length sets the blocks.
@@ -60,10 +62,11 @@ typedef struct {
  */
 int32_t mpc_forecast_start(mpc_forecast *forecast, const mpc_road *trip);
 
-/* Fill in the clock and the preview of the second `step`, the forecast serving as the short preview too.
+/* Fill in the clock and the preview of the second `step`, the forecast serving as the short preview
+ * too.
  *
- * Returns 0, or -1 if nothing is ahead: short_count is then 0, and mpc_step flags
- * MPC_BAD_PREVIEW.
+ * Returns 0, or -1 if nothing is ahead or `forecast` has not been started, or was corrupted:
+ * short_count is then 0, and mpc_step flags MPC_BAD_PREVIEW.
  */
 int32_t mpc_in_from_forecast(mpc_forecast *forecast, int32_t step, mpc_in *in);
 

@@ -26,7 +26,8 @@ void mpc_iterate_clear(mpc_state *state)
 void mpc_iterate_shift(mpc_state *state, int32_t by)
 {
     for (int32_t k = 0; k < (MPC_SHORT - 1); k++) {
-        const int32_t from = ((k + by) < MPC_SHORT) ? (k + by) : (MPC_SHORT - 1);
+        const int32_t later = k + by;
+        const int32_t from = (later < MPC_SHORT) ? later : (MPC_SHORT - 1);
         for (int32_t i = 0; i < MPC_VARS; i++) {
             state->stage[k].x[i] = state->stage[from].x[i];
         }

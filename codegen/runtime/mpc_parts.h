@@ -58,5 +58,6 @@ int32_t mpc_check_second(mpc_real demand_w, mpc_real speed_mps);
 /* mpc_preview.c */
 int32_t mpc_preview_first(mpc_heard *heard, const mpc_in *in);
 int32_t mpc_preview_check(mpc_heard *heard, const mpc_in *in, int32_t elapsed);
+int32_t mpc_preview_check_kept(const mpc_state *state);
 
 #endif

@@ -9,6 +9,15 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
+static int32_t is_stage(mpc_real duration_s, mpc_real net_w, mpc_real speed_mps,
+                        mpc_real internal_off_w)
+{
+    return within(duration_s, REAL(0.0), LONGEST_STAGE_S)
+           & within(net_w, mpc_par.can_net_min_w, mpc_par.can_net_max_w)
+           & within(speed_mps, REAL(0.0), mpc_par.can_speed_max_mps)
+           & within(internal_off_w, mpc_par.can_internal_min_w, mpc_par.can_internal_max_w);
+}
+
 static int32_t is_possible(const mpc_in *in)
 {
     int32_t fine = ((in->short_count >= 1) && (in->short_count <= MPC_SHORT)) ? 1 : 0;
@@ -16,11 +25,19 @@ static int32_t is_possible(const mpc_in *in)
         fine &= mpc_check_second(in->short_demand_w[k], in->short_speed_mps[k]);
     }
     for (int32_t k = 0; k < MPC_LONG; k++) {
-        fine &= within(in->long_duration_s[k], REAL(0.0), LONGEST_STAGE_S);
-        fine &= within(in->long_net_w[k], mpc_par.can_net_min_w, mpc_par.can_net_max_w);
-        fine &= within(in->long_speed_mps[k], REAL(0.0), mpc_par.can_speed_max_mps);
-        fine &= within(in->long_internal_off_w[k], mpc_par.can_internal_min_w,
-                       mpc_par.can_internal_max_w);
+        fine &= is_stage(in->long_duration_s[k], in->long_net_w[k], in->long_speed_mps[k],
+                         in->long_internal_off_w[k]);
+    }
+    return fine;
+}
+
+/* Whether the stages in memory, to be used again, are what a preview can have left there. */
+int32_t mpc_preview_check_kept(const mpc_state *state)
+{
+    int32_t fine = 1;
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
+        const mpc_stage_road *const road = &state->stage[k].road;
+        fine &= is_stage(road->duration_s, road->net_w, road->speed_mps, road->internal_off_w);
     }
     return fine;
 }
@@ -84,8 +101,8 @@ int32_t mpc_preview_check(mpc_heard *heard, const mpc_in *in, int32_t elapsed)
 {
     heard->age = ((heard->age + elapsed) < MPC_NO_PLAN) ? (heard->age + elapsed) : MPC_NO_PLAN;
     const int32_t possible = is_possible(in);
-    const int32_t first = (heard->age == MPC_NO_PLAN) ? 1 : 0;
-    const int32_t fine = possible & (first | goes_on(heard, in));
+    const int32_t follows = goes_on(heard, in);
+    const int32_t fine = possible & ((heard->age == MPC_NO_PLAN) ? 1 : follows);
     if (possible != 0) {
         hear(heard, in);
     }

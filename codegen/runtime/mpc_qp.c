@@ -84,8 +84,11 @@ void mpc_qp_linearise_about_plan(mpc_state *state)
         stage->road.about_t_cl_end_degc =
             real_clip(state->origin_t_cl_degc + stage->x[MPC_VAR_T_CL], COLDEST_DEGC, HOTTEST_DEGC);
         stage->road.about_t_cl_degc = REAL(0.5) * (start + stage->road.about_t_cl_end_degc);
-        stage->road.about_fuel_g_per_s = real_max(stage->x[MPC_VAR_FUEL], REAL(0.0));
-        stage->road.about_p_eng_w = real_max(stage->x[MPC_VAR_P_ENG], REAL(0.0));
+        /* no usable solution is beyond the upper bounds, corrupted memory may be */
+        stage->road.about_fuel_g_per_s = real_clip(stage->x[MPC_VAR_FUEL], REAL(0.0),
+                                                   LARGEST_PLAUSIBLE * mpc_par.unit_fuel_g_per_s);
+        stage->road.about_p_eng_w =
+            real_clip(stage->x[MPC_VAR_P_ENG], REAL(0.0), LARGEST_PLAUSIBLE * mpc_par.unit_power_w);
         start = stage->road.about_t_cl_end_degc;
     }
     for (int32_t k = MPC_SHORT; k < MPC_STAGES; k += MPC_CLASSES) {

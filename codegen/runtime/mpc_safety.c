@@ -63,7 +63,8 @@ static interval of_soc(const mpc_measured *seen, mpc_real margin)
     if (filling_w <= REAL(0.0)) {
         allowed.high = real_max(net_w, mpc_par.aux_power_w) - filling_w;
     } else { /* too full: to be discharged by the demand; while braking, not to be charged */
-        allowed.high = (net_w > REAL(0.0)) ? (net_w - filling_w) : mpc_par.aux_power_w;
+        const mpc_real discharged_w = net_w - filling_w;
+        allowed.high = (net_w > REAL(0.0)) ? discharged_w : mpc_par.aux_power_w;
     }
     allowed.low = real_min(net_w - emptying_w, allowed.high);
     return allowed;
@@ -139,7 +140,9 @@ mpc_command mpc_safety_admissible(mpc_command wish, const mpc_measured *seen)
     mpc_real off[2 * LIMITS];
     for (int32_t tier = 0; tier < 2; tier++) {
         const mpc_real margin = (mpc_real)tier;
-        const interval powers[LIMITS - 1] = {of_battery(seen, margin), of_soc(seen, margin)};
+        interval powers[LIMITS - 1];
+        powers[0] = of_battery(seen, margin);
+        powers[1] = of_soc(seen, margin);
         const int32_t first = tier * LIMITS;
         for (int32_t i = 0; i < (LIMITS - 1); i++) {
             running = narrowed(running, powers[i]);

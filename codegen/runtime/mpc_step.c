@@ -6,7 +6,8 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-void mpc_init(mpc_state *state)
+/* Apart from mpc_init, which nothing in this file may call alone (MISRA C:2012 8.7). */
+static void set_defined(mpc_state *state)
 {
     unsigned char *const byte = (unsigned char *)state;
     for (size_t i = 0U; i < sizeof(mpc_state); i++) {
@@ -24,6 +25,8 @@ void mpc_init(mpc_state *state)
     state->watch.t_cl_since_s = LONG_AGO_S;
     mpc_solver_claim(state);
 }
+
+void mpc_init(mpc_state *state) { set_defined(state); }
 
 /* Make the values of this second and start at the last solution, or from cold. */
 static void prepare(mpc_state *state)
@@ -74,7 +77,8 @@ static void depart_slice(mpc_state *state, const mpc_in *in)
         count = ((MPC_DEPARTURE_ITERATIONS - 1) % MPC_ITERATIONS) + 1;
     }
     const int32_t solved = mpc_solver_iterate(state, count);
-    state->depart_left = (solved != 0) ? (state->depart_left - count) : 0;
+    const int32_t goes_on = ((solved != 0) && (state->depart_left > count)) ? 1 : 0;
+    state->depart_left = (goes_on != 0) ? (state->depart_left - count) : 0;
     if (state->depart_left == 0) {
         state->depart_linearisation++;
         if (conclude(state, solved) == 0) {
@@ -139,7 +143,7 @@ static int32_t take_preview(mpc_state *state, const mpc_in *in, int32_t passed, 
         state->road_age = 0;
     } else {
         *flags |= MPC_BAD_PREVIEW;
-        if ((state->road_age + passed) < MPC_SHORT) {
+        if (((state->road_age + passed) < MPC_SHORT) && (mpc_preview_check_kept(state) != 0)) {
             mpc_qp_road_move_up(state, passed);
             state->road_age += passed;
         } else {
@@ -203,7 +207,7 @@ int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out)
     int32_t elapsed = 1;
     *out = nothing;
     if (mpc_check_state(state) == 0) {
-        mpc_init(state);
+        set_defined(state);
         out->flags = MPC_BAD_STATE;
     }
     mpc_watch *const watch = &state->watch;
