@@ -39,6 +39,11 @@ FLAGS = (
     "-Iosqp -Iosqp/inc/public -Iosqp/inc/private"
 )
 _STATE = 4
+# Before mpc_step.c in a library whose solver fails where it is told to.
+MAY_FAIL = """#include <stdint.h>
+int32_t mpc_solver_may_succeed = 1;
+#define MPC_SOLVER_MAY_SUCCEED mpc_solver_may_succeed
+"""
 
 
 class CodegenError(QpmpcError):
@@ -95,6 +100,8 @@ class HostLibrary:
     input_type, output_type : ctypes structures
     state_bytes : size of one controller's memory
     functions : of the library, by their names in C
+    solver_may_succeed : 0 lets the solver fail, for all controllers of this library; None if it
+        was not built for that
     """
 
     def __init__(self, file: Path, values: Values, precision: Precision, prefix: str = "") -> None:
@@ -129,12 +136,21 @@ class HostLibrary:
         self.depart = getattr(self.functions, f"{prefix}mpc_depart")
         self.step = getattr(self.functions, f"{prefix}mpc_step")
         self.plan = getattr(self.functions, f"{prefix}mpc_plan")
+        self.solver_may_succeed: ctypes.c_int32 | None = None
 
 
 def build_host_library(
-    values: Values, precision: Precision = "f64", algorithm: Algorithm = "admm"
+    values: Values,
+    precision: Precision = "f64",
+    algorithm: Algorithm = "admm",
+    *,
+    may_fail: bool = False,
 ) -> HostLibrary:
     """Generate, compile and load a controller.
+
+    Parameters
+    ----------
+    may_fail : with a switch that lets its solver fail, for the injection of faults
 
     Raises
     ------
@@ -142,7 +158,13 @@ def build_host_library(
         If there is no compiler, or it fails.
     """
     files = project_files(values, "host", precision, algorithm)
-    return HostLibrary(compiled(files), values, precision)
+    if not may_fail:
+        return HostLibrary(compiled(files), values, precision)
+    files["mpc_step.c"] = MAY_FAIL + files["mpc_step.c"]
+    library = HostLibrary(compiled(files), values, precision)
+    switch = ctypes.c_int32.in_dll(library.functions, "mpc_solver_may_succeed")
+    library.solver_may_succeed = switch
+    return library
 
 
 def compiled(files: Mapping[str, str]) -> Path:

@@ -80,6 +80,8 @@ class CvxpyPlanner(Planner):
         self.program.update(self.preview.at(seen.step), seen.soc, seen.t_cl_degc, about)
         try:
             x = self.program.solve(self.solver)
+            if self.solver_fails:
+                raise QpmpcError("failure injected")
         except QpmpcError as error:
             self.forget()
             return Plan.none(str(error))

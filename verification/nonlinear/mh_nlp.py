@@ -72,6 +72,8 @@ class MhNlp(Planner):
         if not plan.solved and start is not None:
             again = self.solver.solve(stages, seen.soc, seen.t_cl_degc)
             plan = replace(again, iterations=again.iterations + plan.iterations)
+        if self.solver_fails:
+            plan = replace(plan, solved=False)
         if plan.solved:
             self._last, self._last_step = plan, seen.step
         return plan
