@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import Progress
+from rich.progress import Progress, TaskID
 
 from qpmpc.errors import InputError
 from qpmpc.files import write_text
@@ -28,11 +28,11 @@ def main(arguments: list[str] | None = None) -> int:
     with Progress(console=Console(stderr=True), transient=True) as bar:
         for car in vehicle_names():
             task = bar.add_task(car, total=1.0)
-            rows = measured(
-                standard_faults(),
-                car,
-                progress=lambda n, of, t=task: bar.update(t, completed=n / of),
-            )
+
+            def report(done: int, total: int, task: TaskID = task) -> None:
+                bar.update(task, completed=done / total)
+
+            rows = measured(standard_faults(), car, progress=report)
             parts.append(f"### {car}\n\n{car}: {summary(rows)}\n\n{table(rows)}")
     before, after = text.partition(BEGIN)[0], text.partition(END)[2]
     write_text(page, before + BEGIN + "\n\n" + "\n".join(parts) + "\n" + END + after)

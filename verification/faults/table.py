@@ -6,7 +6,8 @@ from typing import Any
 
 from qpmpc.controllers.base import Progress
 from qpmpc.faults.effects import OWN
-from qpmpc.simulation import ControllerLike, VehicleLike, simulate
+from qpmpc.registry import ControllerLike
+from qpmpc.simulation import VehicleLike, simulate
 from qpmpc.verification.faults.standard import DURATIONS_S, STARTS_S
 
 CYCLE = "nycc"
@@ -103,7 +104,7 @@ def _cell(effects: list[dict[str, Any]]) -> Cell:
     return Cell(
         min(percent),
         max(percent),
-        max(0, *after, 0) if len(after) == len(effects) else None,
+        max(0, *after) if len(after) == len(effects) else None,
         max(sum(each["drove"].values()) - each["drove"].get(OWN, 0) for each in effects),
     )
 
