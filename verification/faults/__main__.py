@@ -2,10 +2,11 @@
 
 import argparse
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import Progress, TaskID
+from rich.progress import Progress
 
 from qpmpc.errors import InputError
 from qpmpc.files import write_text
@@ -24,16 +25,18 @@ def main(arguments: list[str] | None = None) -> int:
     text = page.read_text("utf-8")
     if not 0 <= text.find(BEGIN) < text.find(END):
         raise InputError(f"{page}: no marks {BEGIN} and {END}")
+    faults, cars = standard_faults(), vehicle_names()
+    with (
+        ProcessPoolExecutor() as pool,
+        Progress(console=Console(stderr=True), transient=True) as bar,
+    ):
+        each = [(fault, car) for car in cars for fault in faults]
+        found = pool.map(measured, *zip(*each, strict=True))
+        rows = list(bar.track(found, total=len(each), description="faults"))
     parts = []
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        for car in vehicle_names():
-            task = bar.add_task(car, total=1.0)
-
-            def report(done: int, total: int, task: TaskID = task) -> None:
-                bar.update(task, completed=done / total)
-
-            rows = measured(standard_faults(), car, progress=report)
-            parts.append(f"### {car}\n\n{car}: {summary(rows)}\n\n{table(rows)}")
+    for car in cars:
+        of_car, rows = rows[: len(faults)], rows[len(faults) :]
+        parts.append(f"### {car}\n\n{car}: {summary(of_car)}\n\n{table(of_car)}")
     before, after = text.partition(BEGIN)[0], text.partition(END)[2]
     write_text(page, before + BEGIN + "\n\n" + "\n".join(parts) + "\n" + END + after)
     return 0

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 from qpmpc.faults.kinds import MEASURED
 
 DURATIONS_S = (3, 10)
-STARTS_S = (60, 160, 260, 360, 460, 560)
+STARTS_S = (60, 150, 200, 278, 420, 545)  # with the engine on, off, about to start
 
 
 class Sizes(NamedTuple):

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from qpmpc.controllers.base import Progress
 from qpmpc.faults.effects import OWN
 from qpmpc.registry import ControllerLike
 from qpmpc.simulation import VehicleLike, simulate
@@ -56,29 +55,17 @@ class Row:
 
 
 def measured(
-    faults: Sequence[dict[str, Any]],
+    fault: dict[str, Any],
     vehicle: VehicleLike,
     controller: ControllerLike = "mh-qp",
-    progress: Progress | None = None,
     settings: dict[str, object] | None = None,
-) -> list[Row]:
-    """Drive each fault alone from every beginning, for every duration."""
+) -> Row:
+    """Drive a fault alone from every beginning, for every duration."""
     timed = [
-        {**fault, "at_s": start, "for_s": seconds}
-        for fault in faults
-        for seconds in DURATIONS_S
-        for start in STARTS_S
+        {**fault, "at_s": start, "for_s": seconds} for seconds in DURATIONS_S for start in STARTS_S
     ]
-    found: list[dict[str, Any]] = []
-    size = len(DURATIONS_S) * len(STARTS_S)
-    for first in range(0, len(timed), size):
-        part = timed[first : first + size]
-        run = simulate(CYCLE, controller, vehicle, faults=part, settings=settings)
-        assert run.faults is not None
-        found += run.faults["each"]
-        if progress is not None:
-            progress(first + size, len(timed))
-    return [_row(found[k : k + size]) for k in range(0, len(found), size)]
+    run = simulate(CYCLE, controller, vehicle, faults=timed, settings=settings)
+    return _row(run.faults["each"] if run.faults else [])
 
 
 def _row(effects: list[dict[str, Any]]) -> Row:
