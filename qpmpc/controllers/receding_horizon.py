@@ -197,6 +197,7 @@ class RecedingHorizon(Controller):
         self, hearing: Callable[[Receive], Receive] | None, solver: bool = False
     ) -> frozenset[str]:
         """Prepare the planner for faults; see `Controller.inject`."""
+        self.planner.solver_fails = False
         preview = getattr(self.planner, "preview", None)
         if not isinstance(preview, CheckedPreview):
             return frozenset({"solver"})
