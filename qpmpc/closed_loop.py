@@ -43,6 +43,7 @@ def drive(
         If a fault would begin after the arrival.
     """
     if faults:
+        controller.check_ready(trip)
         injection = Injection(controller, faults)
         try:
             run = _drive(trip, controller, injection.decide, on_step, progress)

@@ -80,6 +80,7 @@ def _drive_under(
     progress: Progress | None,
 ) -> Run:
     """Drive without faults, with each alone and with all, and compare."""
+    faults.check_within(trip.steps)
     sets = [None, *(Faults([fault]) for fault in faults), faults]
     jobs = len(sets)
     runs: list[Run] = []

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 
 from qpmpc.controllers.base import Controller, Decision
-from qpmpc.errors import InputError
 from qpmpc.faults.alter import altered_preview, altered_signal
 from qpmpc.faults.kinds import OF_PREVIEW, SIGNALS
 from qpmpc.faults.models import Fault, Faults
@@ -36,13 +35,7 @@ class Injection:
     """
 
     def __init__(self, controller: Controller, faults: Faults) -> None:
-        steps = controller.trip.steps
-        for number, fault in enumerate(faults, start=1):
-            if fault.at_s >= steps:
-                raise InputError(
-                    f"fault {number}: at_s must be below {steps}, the seconds of the trip "
-                    f"(given: {fault.at_s})"
-                )
+        faults.check_within(controller.trip.steps)
         self._controller, self._faults = controller, faults
         self._second: int | None = None
         self._seen: dict[str, list[object]] = {signal: [] for signal in SIGNALS}

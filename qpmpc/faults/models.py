@@ -82,6 +82,21 @@ class Faults(tuple[Fault, ...]):
 
     __slots__ = ()
 
+    def check_within(self, steps: int) -> None:
+        """Check that each begins in a trip of that many seconds.
+
+        Raises
+        ------
+        InputError
+            If one does not.
+        """
+        for number, fault in enumerate(self, start=1):
+            if fault.at_s >= steps:
+                raise InputError(
+                    f"fault {number}: at_s must be below {steps}, the seconds of the trip "
+                    f"(given: {fault.at_s})"
+                )
+
 
 FaultsLike = str | os.PathLike[str] | Sequence[Fault | Mapping[str, Any]]
 
