@@ -1,5 +1,6 @@
 # make run    the main job: real cycles, rule-based against MPC, tables and pictures in results/
 # make test   style, types and tests
+# make fuzz   100,000 hostile inputs to the loaders of users' files
 # make docs   API reference from the docstrings, in build/api
 # make clean  remove everything these made
 # Both first make the virtual environment .venv; a second time that is skipped.
@@ -15,13 +16,16 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 # in which the mapped folders are where they are imported from.
 TYPED := build/typed
 
-.PHONY: run test lint types docs venv clean
+.PHONY: run test fuzz lint types docs venv clean
 
 run: $(STAMP)
 	$(BIN)/qpmpc compare nycc nedc-truncated --controllers rule-based,mh-qp-paper,mh-qp --out results
 
 test: lint types
 	$(BIN)/python -m pytest
+
+fuzz: $(STAMP)
+	QPMPC_FUZZ=100000 $(BIN)/python -m pytest --dist=load tests/test_hostile_inputs.py
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -31,14 +31,14 @@ class InputBuilder:
     """
 
     def __init__(self, receive: Receive) -> None:
-        self._receive = receive
+        self.receive = receive
 
     def fill(self, seen: Observation, into: Any) -> None:
         """Write all inputs of one step."""
         into.soc, into.t_cl_degc = seen.soc, seen.t_cl_degc
         into.demand_w, into.speed_mps = seen.demand_w, seen.speed_mps
         into.engine_on, into.second = int(seen.engine_on), seen.step
-        preview = self._receive(seen.step)
+        preview = self.receive(seen.step)
         into.short_count = preview.short_count
         into.short_demand_w[:] = preview.short_demand_w.tolist()
         into.short_speed_mps[:] = preview.short_speed_mps.tolist()
@@ -90,6 +90,7 @@ class GeneratedController(Controller):
         rules, section = self.settings.rule_based, name.replace("-", "_")
         values = values_of(trip.vehicle, self.of_qp, rules, blocks, section)
         self.library = self._normal = build_host_library(values, precision)
+        self.remarks += filter(None, [self.library.remark])
         self.fill_s = self.call_s = 0.0
         self._receive = trip.preview(self.of_qp.horizon).receive
         self.inputs = InputBuilder(self._receive)
@@ -127,7 +128,7 @@ class GeneratedController(Controller):
         self.library = (
             build_host_library(normal.values, normal.precision, may_fail=True) if solver else normal
         )
-        self.inputs = InputBuilder(self._receive if hearing is None else hearing(self._receive))
+        self.inputs.receive = self._receive if hearing is None else hearing(self._receive)
         return frozenset({"preview", "solver"})
 
     def forget(self) -> None:

@@ -3,6 +3,7 @@
 import ctypes
 import hashlib
 import os
+import platform
 import shutil
 import subprocess
 import tempfile
@@ -13,10 +14,12 @@ from typing import Any
 
 from qpmpc.codegen.examples import is_example
 from qpmpc.codegen.generate import Algorithm, Precision, project_files
+from qpmpc.codegen.library_cache import Kept, kept_library
 from qpmpc.codegen.values import Values
 from qpmpc.errors import QpmpcError
 from qpmpc.files import write_text
 from qpmpc.qp.rows import VARS
+from qpmpc.remarks import say_once
 
 ABI_VERSION = 3
 _ABI_NAMES = (
@@ -38,6 +41,7 @@ FLAGS = (
     "-O3 -std=c99 -w -ffp-contract=off -fPIC -shared -Wl,-Bsymbolic "
     "-Iosqp -Iosqp/inc/public -Iosqp/inc/private"
 )
+NEEDS_NONE = "mh_qp.implementation=python needs none"
 _STATE = 4
 # Before mpc_step.c in a library whose solver fails where it is told to.
 MAY_FAIL = """#include <stdint.h>
@@ -100,19 +104,38 @@ class HostLibrary:
     input_type, output_type : ctypes structures
     state_bytes : size of one controller's memory
     functions : of the library, by their names in C
+    remark : what a user should know about where it is kept, in one line; may be empty
     solver_may_succeed : 0 lets the solver fail, for all controllers of this library; None if it
         was not built for that
+
+    Raises
+    ------
+    CodegenError
+        If it cannot be loaded or does not fit.
     """
 
-    def __init__(self, file: Path, values: Values, precision: Precision, prefix: str = "") -> None:
+    def __init__(
+        self,
+        file: Path,
+        values: Values,
+        precision: Precision,
+        prefix: str = "",
+        remark: str = "",
+    ) -> None:
         sizes = values.sizes
-        self.values, self.precision = values, precision
+        self.values, self.precision, self.remark = values, precision, remark
         self.real = ctypes.c_float if precision == "f32" else ctypes.c_double
         self.input_type, self.output_type = structures(
             precision, sizes.short_stages, sizes.long_stages
         )
-        self.functions = ctypes.CDLL(str(file))
-        abi = getattr(self.functions, f"{prefix}mpc_abi")
+        try:
+            self.functions = ctypes.CDLL(str(file))
+            abi, self.init, self.depart, self.step, self.plan = (
+                getattr(self.functions, f"{prefix}mpc_{name}")
+                for name in ("abi", "init", "depart", "step", "plan")
+            )
+        except (OSError, AttributeError) as error:
+            raise CodegenError(f"{file} cannot be loaded: {error}") from error
         found = [abi(i) for i in range(len(_ABI_NAMES))]
         self.state_bytes = found[_STATE]
         expected = [
@@ -132,10 +155,6 @@ class HostLibrary:
         for name, have, want in zip(_ABI_NAMES, found, expected, strict=True):
             if have != want:
                 raise CodegenError(f"{file}: {name} is {have}, expected {want}")
-        self.init = getattr(self.functions, f"{prefix}mpc_init")
-        self.depart = getattr(self.functions, f"{prefix}mpc_depart")
-        self.step = getattr(self.functions, f"{prefix}mpc_step")
-        self.plan = getattr(self.functions, f"{prefix}mpc_plan")
         self.solver_may_succeed: ctypes.c_int32 | None = None
 
 
@@ -155,85 +174,76 @@ def build_host_library(
     Raises
     ------
     CodegenError
-        If there is no compiler, or it fails.
+        If there is no compiler, or it fails, or its library cannot be loaded.
     """
     files = project_files(values, "host", precision, algorithm)
-    if not may_fail:
-        return HostLibrary(compiled(files), values, precision)
-    files["mpc_step.c"] = MAY_FAIL + files["mpc_step.c"]
-    library = HostLibrary(compiled(files), values, precision)
-    switch = ctypes.c_int32.in_dll(library.functions, "mpc_solver_may_succeed")
-    library.solver_may_succeed = switch
+    if may_fail:
+        files["mpc_step.c"] = MAY_FAIL + files["mpc_step.c"]
+    kept = _kept(files)
+    library = HostLibrary(kept.file, values, precision, remark=kept.remark)
+    if may_fail:
+        switch = ctypes.c_int32.in_dll(library.functions, "mpc_solver_may_succeed")
+        library.solver_may_succeed = switch
     return library
 
 
 def compiled(files: Mapping[str, str]) -> Path:
-    """Compile the files of a project, by name, into a library kept in the cache by its contents.
+    """Compile the files of a project, by name, into a library kept by its contents.
 
     Raises
     ------
     CodegenError
         If there is no compiler, or it fails.
     """
+    return _kept(files).file
+
+
+def _kept(files: Mapping[str, str]) -> Kept:
     command = compiler()
     if command is None:
         raise CodegenError("no C compiler found (tried $CC, cc, gcc, clang)")
-    digest = hashlib.sha256(f"{command} {FLAGS}".encode())
-    for name, text in files.items():
-        digest.update(f"{name}\0{text}\0".encode())
-    kept = _cache_folder() / f"{digest.hexdigest()[:24]}.so"
-    if not _loads(kept):
-        _build(files, command, kept)
+    try:
+        found = Path(command).stat()
+        identity = (command, found.st_size, found.st_mtime_ns, platform.machine(), FLAGS)
+        digest = hashlib.sha256(f"{identity} {_version(identity)!r}".encode())
+        for name, text in files.items():
+            digest.update(f"{name}\0{text}\0".encode())
+        kept = kept_library(digest.hexdigest()[:24], lambda: _built(files, command))
+    except OSError as error:
+        raise CodegenError(f"no compiled controller: {error}; {NEEDS_NONE}") from error
+    if kept.remark:
+        say_once(kept.remark)
     return kept
 
 
-def _loads(file: Path) -> bool:
-    """Whether the file is there and whole."""
-    if not file.exists():
-        return False
+@cache
+def _version(identity: tuple[str | int, ...]) -> bytes:
+    """Return what a compiler says of itself; its file may be a wrapper that stays the same."""
+    said = subprocess.run([str(identity[0]), "--version"], capture_output=True, check=False)
+    return said.stdout
+
+
+def _built(files: Mapping[str, str], command: str) -> bytes:
+    """Compile; returns the content of the library."""
     try:
-        ctypes.CDLL(str(file))
-    except OSError:
-        return False
-    return True
-
-
-def _cache_folder() -> Path:
-    chosen = os.environ.get("QPMPC_CACHE_DIR")
-    if chosen:
-        folder = Path(chosen) / "compiled"
-        folder.mkdir(parents=True, exist_ok=True)
-        return folder
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    folder = Path(base) / "qpmpc-iptm"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if os.access(folder, os.W_OK):
-            return folder
-    except OSError:
-        pass
-    folder = Path(tempfile.gettempdir()) / f"qpmpc-iptm-{os.getuid()}"
-    folder.mkdir(mode=0o700, exist_ok=True)
-    return folder
-
-
-def _build(files: Mapping[str, str], command: str, kept: Path) -> None:
-    with tempfile.TemporaryDirectory(dir=kept.parent) as scratch:
-        folder = Path(scratch)
-        for name, text in files.items():
-            write_text(folder / name, text)
-        sources = sorted(n for n in files if n.endswith(".c") and not is_example(n))
-        result = subprocess.run(
-            [command, *FLAGS.split(), "-o", "libmpc.so", *sources, "-lm"],
-            cwd=folder,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        made = folder / "libmpc.so"
-        if result.returncode or not _loads(made):
-            first = next(iter(result.stderr.strip().splitlines()), "no library was built")
-            raise CodegenError(
-                f"C compiler {command} failed: {first}; mh_qp.implementation=python needs none"
+        with tempfile.TemporaryDirectory() as scratch:
+            folder = Path(scratch)
+            for name, text in files.items():
+                write_text(folder / name, text)
+            sources = sorted(n for n in files if n.endswith(".c") and not is_example(n))
+            result = subprocess.run(
+                [command, *FLAGS.split(), "-o", "libmpc.so", *sources, "-lm"],
+                cwd=folder,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                check=False,
             )
-        made.replace(kept)
+            made = folder / "libmpc.so"
+            content = made.read_bytes() if made.exists() and not result.returncode else b""
+    except OSError as error:
+        raise CodegenError(f"C compiler {command} cannot be run: {error}; {NEEDS_NONE}") from error
+    if not content:
+        first = next(iter(result.stderr.strip().splitlines()), "no library was built")
+        raise CodegenError(f"C compiler {command} failed: {first}; {NEEDS_NONE}")
+    return content

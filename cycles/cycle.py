@@ -42,6 +42,8 @@ class Cycle:
         Vehicle speed, not negative, m/s. Shape (n+1,).
     grade
         Rise over run, dimensionless, positive uphill. Shape (n+1,).
+    remarks
+        What a user should know about it, one line each: unusual values, for example.
 
     Raises
     ------
@@ -54,6 +56,7 @@ class Cycle:
     time_s: Floats
     speed_mps: Floats
     grade: Floats
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for field in ("time_s", "speed_mps", "grade"):

@@ -17,15 +17,33 @@ ACCEL_MAX_MPS2 = 10.0
 GRADE_MAX = 0.3
 """The steepest public streets are just above it; a larger number is most likely in percent."""
 
+GRADE_MEAN_MAX = 0.12
+"""Mean of |grade| over the way that a road up and down can have over `ROAD_MIN_M`.
+
+The steepest roads of that length over a mountain, such as Mount Washington's, have 0.116 on either
+side. A level road of which the grade in percent is read as rise over run has more.
+"""
+
+ROAD_MIN_M = 3000.0
+ROLLING_MIN = 0.25
+"""Least share of the rise that is also descended for a road up and down: a ramp is somebody's test,
+not a road misread."""
+
 GAP_MAX_S = 10.0
 """Longest gap that is filled by a straight line.
 
 A logger's dropout in a tunnel lasts some seconds; over a longer one a straight line would hide
-whole stops and their fuel. Where the speed is the same at both ends, as when the logger sleeps
-while the car stands, the straight line is correct.
+whole stops and their fuel.
 """
 
-GAP_SPEED_CHANGE_MPS = 0.5
+GAP_STANDING_MAX_S = 300.0
+"""Longest gap where the car stands at both ends, as when the logger sleeps: a long red light.
+
+Whoever stands longer has parked: engine and cabin are off, which a trip does not know. The rules
+of the EU's real driving emissions test, too, take a trip apart at stops of 300 s.
+"""
+
+STANDING_MPS = 0.5
 DURATION_MIN_S = 3.0
 DURATION_MAX_S = 86400.0
 
@@ -84,19 +102,21 @@ def check_samples(
         f"grade is {{:g}}, must be -{GRADE_MAX:g} to {GRADE_MAX:g}, rise over run: "
         "divide percent by 100",
     )
-    _refuse(
-        path,
-        lines[1:],
-        (step_s > GAP_MAX_S) & (np.abs(np.diff(speed_mps)) > GAP_SPEED_CHANGE_MPS),
-        step_s,
-        f"{{:g}} s without a sample, at most {GAP_MAX_S:g} s are allowed unless the speed is the "
-        "same before and after: the motion in between is not known",
-    )
     duration_s = time_s[-1] - time_s[0]
     if not DURATION_MIN_S <= duration_s <= DURATION_MAX_S:
         raise InputError(
             f"{path}: the trip lasts {duration_s:g} s, must be {DURATION_MIN_S:g} s to 24 h"
         )
+    standing = np.maximum(speed_mps[:-1], speed_mps[1:]) <= STANDING_MPS
+    _refuse(
+        path,
+        lines[1:],
+        step_s > np.where(standing, GAP_STANDING_MAX_S, GAP_MAX_S),
+        step_s,
+        f"{{:g}} s without a sample, at most {GAP_MAX_S:g} s are allowed, "
+        f"{GAP_STANDING_MAX_S:g} s standing: the motion in between is not known; if these are two "
+        "trips, make a file of each",
+    )
 
 
 def check_motion(path: Path, lines: Sequence[int], time_s: Floats, cycle: Cycle) -> None:
@@ -140,6 +160,27 @@ def check_motion(path: Path, lines: Sequence[int], time_s: Floats, cycle: Cycle)
         raise InputError(
             f"{path}, line {line}: the speed changes by {accel[k]:.1f} m/s in a second, at most "
             f"{ACCEL_MAX_MPS2:g} are allowed; a wrong sample, or a wrong unit: {TO_MPS}"
+        )
+
+
+def check_road(path: Path, cycle: Cycle) -> None:
+    """Check that a road can be this steep; catches grades in percent on a level road.
+
+    Raises
+    ------
+    InputError
+        If the road goes up and down, and is steeper all along than any over a mountain.
+    """
+    way_m, rise_m = cycle.step_speed_mps, cycle.step_speed_mps * cycle.step_grade
+    length_m = float(np.sum(way_m))
+    up_m, down_m = float(np.sum(rise_m[rise_m > 0])), -float(np.sum(rise_m[rise_m < 0]))
+    if length_m < ROAD_MIN_M or min(up_m, down_m) < ROLLING_MIN * max(up_m, down_m):
+        return
+    mean = (up_m + down_m) / length_m
+    if mean > GRADE_MEAN_MAX:
+        raise InputError(
+            f"{path}: grade is {mean:.2g} in the mean, up and down over {length_m / 1e3:.1f} km; "
+            f"no road has more than {GRADE_MEAN_MAX:g}, rise over run: divide percent by 100"
         )
 
 

@@ -1,14 +1,24 @@
 """Import of a user's drive from CSV, with one clear line about any error."""
 
 import csv
+import io
 import re
+from array import array
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from qpmpc.cycles.cycle import Cycle, Floats
-from qpmpc.cycles.plausibility import check_motion, check_samples
+from qpmpc.cycles.plausibility import check_motion, check_road, check_samples
+from qpmpc.cycles.suspicion import suspicions
 from qpmpc.errors import InputError
+from qpmpc.input_text import read_text
+from qpmpc.remarks import say_once
+
+MEGABYTES_MAX = 64
+"""24 h at 25 samples a second."""
 
 REQUIRED = ("time_s", "speed_mps")
 OPTIONAL = ("grade",)
@@ -43,47 +53,50 @@ def read_csv(path: Path, *, name: str | None = None) -> Cycle:
         One line that names the file, the line and what is allowed: unreadable file, columns other
         than the above, values that are not numbers or out of range, time that does not increase,
         a gap, a trip too short or too long, or motion that no road vehicle is capable of, as when
-        speeds in km/h or mph are given as m/s (see `qpmpc.cycles.plausibility`).
+        speeds in km/h or mph are given as m/s (see `qpmpc.cycles.plausibility`). What is possible
+        but unusual becomes a remark of the cycle (see `qpmpc.cycles.suspicion`).
     """
-    rows = _rows(path)
-    if not rows:
+    lines, table = _table(path, read_text(path, MEGABYTES_MAX))
+    time, speed = table["time_s"], table["speed_mps"]
+    grade = table.get("grade", np.zeros(len(time)))
+
+    check_samples(path, lines, time, speed, grade)
+    cycle = Cycle.from_samples(name if name is not None else path.stem, time, speed, grade)
+    check_motion(path, lines, time, cycle)
+    check_road(path, cycle)
+    remarks = tuple(f"{path}: {remark}" for remark in suspicions(cycle))
+    for remark in remarks:
+        say_once(remark)
+    return replace(cycle, remarks=remarks)
+
+
+def _table(path: Path, text: str) -> tuple[Sequence[int], dict[str, Floats]]:
+    """Line number of each row, and its numbers by column; blank lines at the end are dropped.
+
+    Row by row, so that a file that is no table is refused at its first line, whatever its length.
+    """
+    if not text.strip(" \t\r\n,"):
         raise InputError(f"{path}: the file is empty; it needs a header {ALLOWED_TEXT} and rows")
-    columns = _columns(path, rows[0][1])
-    if len(rows) < 3:
-        raise InputError(f"{path}: {len(rows) - 1} row(s) below the header, at least 2 are needed")
-    lines = [line for line, _ in rows[1:]]
-    table = np.array([_numbers(path, line, cells, columns) for line, cells in rows[1:]])
-    values: dict[str, Floats] = {column: table[:, k] for k, column in enumerate(columns)}
-    grade = values.get("grade", np.zeros(len(table)))
-
-    check_samples(path, lines, values["time_s"], values["speed_mps"], grade)
-    cycle = Cycle.from_samples(
-        name if name is not None else path.stem, values["time_s"], values["speed_mps"], grade
-    )
-    check_motion(path, lines, values["time_s"], cycle)
-    return cycle
-
-
-def _rows(path: Path) -> list[tuple[int, list[str]]]:
-    """Line number and stripped cells of each row, without the blank ones at the end."""
+    reader = csv.reader(io.StringIO(text, newline=""))
+    rows = ((reader.line_num, [cell.strip() for cell in row]) for row in reader)
+    lines, numbers = array("q"), array("d")
+    blank: list[tuple[int, list[str]]] = []
     try:
-        # "utf-8-sig" drops a byte order mark
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file)
-            rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a directory, not a CSV file") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    except (UnicodeDecodeError, csv.Error):
+        columns = _columns(path, next(rows)[1])
+        for line, cells in rows:
+            if not any(cells):
+                blank = blank or [(line, cells)]
+                continue
+            for first, nothing in blank:  # a blank line, but not at the end
+                _numbers(path, first, nothing, columns)
+            lines.append(line)
+            numbers.extend(_numbers(path, line, cells, columns))
+    except csv.Error:
         raise InputError(f"{path}: not a CSV file: it must be plain text in UTF-8") from None
-    if any("\0" in cell for _, cells in rows for cell in cells):
-        raise InputError(f"{path}: not a CSV file: it must be plain text in UTF-8")
-    while rows and not any(rows[-1][1]):
-        rows.pop()
-    return rows
+    if len(lines) < 2:
+        raise InputError(f"{path}: {len(lines)} row(s) below the header, at least 2 are needed")
+    table = np.array(numbers).reshape(len(lines), len(columns))
+    return lines, {column: table[:, k] for k, column in enumerate(columns)}
 
 
 def _columns(path: Path, header: list[str]) -> list[str]:

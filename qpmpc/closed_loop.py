@@ -85,7 +85,11 @@ def _drive(
         controller=controller.name,
         solver=controller.solver_name,
         implementation=controller.implementation,
-        remarks=(*controller.remarks, *_fallbacks(controller.name, record.fallback)),
+        remarks=(
+            *trip.cycle.remarks,
+            *controller.remarks,
+            *_fallbacks(controller.name, record.fallback),
+        ),
         vehicle=trip.vehicle,
         distance_km=trip.cycle.distance_m / 1e3,
         trajectory=record,

@@ -20,6 +20,7 @@ from qpmpc.report.columns import COMPARE_COLUMNS, notes
 from qpmpc.report.table import print_rows
 from qpmpc.report.write import comparison_html, write_comparison
 from qpmpc.results import Run, compare_runs
+from qpmpc.shown import shown
 from qpmpc.simulation import CycleLike, VehicleLike, prepared, remark_idle_settings
 from qpmpc.trip import Trip, as_trip
 from qpmpc.vehicle import Vehicle
@@ -96,7 +97,7 @@ class Runs(Sequence[Run]):
         text = StringIO()
         console = Console(file=text, width=PRINTED_WIDTH, highlight=False)
         print_rows(console, self.rows(), COMPARE_COLUMNS, "cycle")
-        return "\n".join([text.getvalue().rstrip(), *self.remarks()])
+        return "\n".join([text.getvalue().rstrip(), *map(shown, self.remarks())])
 
 
 def compare(

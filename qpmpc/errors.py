@@ -1,8 +1,17 @@
 """The exceptions of qpmpc, with one base class for callers to catch."""
 
+from qpmpc.shown import shown
+
 
 class QpmpcError(Exception):
-    """Base class of every error raised on purpose by qpmpc."""
+    """Base class of every error raised on purpose by qpmpc.
+
+    Its text may hold names and values of files: it is shown on one line, control characters
+    escaped.
+    """
+
+    def __str__(self) -> str:
+        return shown(super().__str__())
 
 
 class InputError(QpmpcError):

@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from qpmpc.errors import InputError
+from qpmpc.problems import shown_value
 from qpmpc.remarks import say_once
 
 
@@ -115,9 +116,10 @@ class Names:
             return point.load()
         except Exception as error:
             owner = point.dist.name if point.dist else "an installed package"
+            reason = " ".join(str(error).split())  # such a message may have several lines
             raise InputError(
                 f"{self.kind} {name!r} of {owner} cannot be loaded from {point.value}: "
-                f"{type(error).__name__}: {error}"
+                f"{type(error).__name__}: {reason}"
             ) from error
 
     def unknown(self, name: str) -> str:
@@ -141,4 +143,4 @@ def unknown(kind: str, name: str, allowed: tuple[str, ...], also: str = "") -> s
     """Return the message for an unknown name: the nearest known one and all others."""
     near = difflib.get_close_matches(name, allowed, n=1)
     hint = f", did you mean {near[0]!r}?" if near else ":"
-    return f"unknown {kind} {name!r}{hint} use one of {', '.join(allowed)}{also}"
+    return f"unknown {kind} {shown_value(name)}{hint} use one of {', '.join(allowed)}{also}"

@@ -16,6 +16,8 @@ _WORDS = {
     "dict_type": "must be a table",
     "tuple_type": "must be an array",
     "too_short": "must have at least {min_length} entries",
+    "too_long": "must have at most {max_length} entries",
+    "string_too_long": "must have at most {max_length} characters",
 }
 
 
@@ -60,6 +62,8 @@ def shown_value(value: object) -> str:
         return _cut(str(value).lower() if isinstance(value, bool) else repr(value))
     except ValueError:  # Python prints no integer of more than some thousand digits
         return "a number too long to show"
+    except RecursionError:
+        return "a value nested too deeply to show"
 
 
 def _wrong(each: ErrorDetails, key: str, owner: str, origins: Mapping[str, str]) -> str:

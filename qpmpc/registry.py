@@ -14,6 +14,7 @@ from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles.load import CYCLES
 from qpmpc.errors import InputError
 from qpmpc.names import Names, Shipped, unknown
+from qpmpc.problems import shown_value
 from qpmpc.solvers.names import SOLVERS
 from qpmpc.trip import Trip
 from qpmpc.vehicle.names import VEHICLES
@@ -53,6 +54,7 @@ CHECKS = Names(
             "nlp-loop",
             "balances",
             "physics",
+            "safety",
             "epa",
             "bounds",
         )
@@ -217,7 +219,8 @@ def check_sections(
             near = get_close_matches(_section(section), known, n=1)
             hint = f", did you mean {near[0]!r}?" if near else ":"
             raise InputError(
-                f"no parameter {key!r}{hint} names start with one of {', '.join(known)} and a dot"
+                f"no parameter {shown_value(key)}{hint} names start with one of "
+                f"{', '.join(known)} and a dot"
             )
         if model is None:
             raise InputError(f"controller {section.replace('_', '-')!r} has no settings of its own")

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from qpmpc.controllers.base import Decision
 from qpmpc.controllers.monitor import Flag
+from qpmpc.limits import Excess, excess_of, sentence
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.plant import PlantState, StepFlows
@@ -17,6 +19,7 @@ Floats = NDArray[np.float64]
 
 REFERENCE, OPTIMUM = "rule-based", "dp"  # controllers that the others are compared with
 COMPARABLE_SHARE = 0.03  # largest SOC correction, as a share of fuel, of a comparable run
+MOSTLY = 0.5  # share of the time
 
 
 @dataclass
@@ -115,10 +118,34 @@ class Run:
         """Fuel as if the run had ended at its initial SOC."""
         return self.fuel_g + self.soc_correction_g
 
+    @cached_property
+    def excess(self) -> Excess:
+        """Excess over the limits, second by second."""
+        return excess_of(self.vehicle, self.trajectory)
+
+    @property
+    def not_comparable(self) -> list[str]:
+        """Why the run's fuel cannot be compared with that of others; empty if it can."""
+        found = []
+        share = abs(self.soc_correction_g) / self.fuel_g if self.fuel_g else np.inf
+        if self.soc_correction_g and share > COMPARABLE_SHARE:
+            found.append(
+                f"the correction for its final SOC is {100.0 * share:.3g} % of its fuel, more than "
+                f"{100.0 * COMPARABLE_SHARE:g} %"
+            )
+        left = sentence(self.vehicle, self.trajectory, self.excess)
+        if left:
+            found.append(left)
+        rungs = self.trajectory.fallback
+        fallback = sum(1 for rung in rungs if rung)
+        if fallback > MOSTLY * len(rungs):
+            found.append(f"fallbacks drove in {fallback} of {len(rungs)} s")
+        return found
+
     @property
     def comparable(self) -> bool:
-        """Whether the SOC correction is small enough for a fair comparison."""
-        return abs(self.soc_correction_g) <= COMPARABLE_SHARE * self.fuel_g
+        """Whether final SOC, limits and fallbacks allow a fair comparison of fuel."""
+        return not self.not_comparable
 
     def summary(self) -> dict[str, Any]:
         """Return the figures of the run as plain data, ready for JSON.
@@ -126,7 +153,7 @@ class Run:
         `violations` holds the largest excess over each limit, 0 if none; figures that a controller
         does not have (its relaxation gap, say) are null.
         """
-        tr, battery, thermal = self.trajectory, self.vehicle.battery, self.vehicle.thermal
+        tr, excess, reasons = self.trajectory, self.excess, self.not_comparable
         step_ms = tr.step_time_s[np.isfinite(tr.step_time_s)] * 1e3
         gap = tr.relaxation_gap[np.isfinite(tr.relaxation_gap)]
         share = tr.on_share[np.isfinite(tr.on_share)]
@@ -138,7 +165,7 @@ class Run:
             "distance_km": self.distance_km,
             "fuel_g": self.fuel_g,
             "fuel_soc_balanced_g": self.fuel_soc_balanced_g,
-            "comparable": self.comparable,
+            "comparable": not reasons,
             "soc_init": float(tr.soc[0]),
             "soc_end": float(tr.soc[-1]),
             "soc_min": float(tr.soc.min()),
@@ -149,11 +176,9 @@ class Run:
             "engine_starts": int(tr.started.sum()),
             "engine_on_share": float(tr.engine_on.mean()),
             "violations": {
-                "soc": _excess(tr.soc[1:], battery.soc_min, battery.soc_max),
-                "t_cl_degc": _excess(
-                    tr.t_cl_degc[1:], thermal.t_cl_min_degc, thermal.t_cl_max_degc
-                ),
-                "power_w": float(tr.power_excess_w.max()),
+                "soc": float(excess.soc.max()),
+                "t_cl_degc": float(excess.t_cl_k.max()),
+                "power_w": float(excess.power_w.max()),
             },
             "fallback_steps": sum(1 for rung in tr.fallback if rung),
             "relaxation_gap": {"max": _max(gap), "mean": float(gap.mean()) if len(gap) else None},
@@ -169,7 +194,10 @@ class Run:
                 "iterations_max": int(tr.iterations.max()) if self.solver else None,
                 "iterations_median": float(np.median(tr.iterations)) if self.solver else None,
             },
-            "remarks": list(self.remarks),
+            "remarks": [
+                *self.remarks,
+                *(f"{self.controller} on {self.cycle}: not comparable: {why}" for why in reasons),
+            ],
             "flags": flag_seconds(tr.flags),
             **({} if self.faults is None else {"faults": self.faults}),
         }
@@ -182,10 +210,6 @@ def flag_seconds(flags: NDArray[np.int64]) -> dict[str, int]:
     """Return for how many seconds each flag was raised, for those that were."""
     seconds = {flag: int(np.count_nonzero(flags & flag)) for flag in Flag}
     return {name: count for flag, count in seconds.items() if count for name in flag.names()}
-
-
-def _excess(values: Floats, low: float, high: float) -> float:
-    return float(max(low - values.min(), values.max() - high, 0.0))
 
 
 def _max(values: Floats) -> float | None:

@@ -1,5 +1,6 @@
 """Reading and checking parameters: TOML text, dotted overrides, one-line errors."""
 
+import re
 import tomllib
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -9,7 +10,13 @@ import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from qpmpc.errors import InputError
-from qpmpc.problems import problems_line
+from qpmpc.problems import problems_line, shown_value
+
+DEPTH_MAX = 32
+"""Tables in tables, and parts of a key: a vehicle has two. The parser takes quadratic time."""
+
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
+_TOO_MANY_PARTS = re.compile(rf"(?<![\w-])(?:{_PART}\.[ \t]*+){{{DEPTH_MAX}}}")
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -23,11 +30,32 @@ def load_toml(text: str, owner: str) -> dict[str, Any]:
         If the text is not valid TOML.
     """
     try:
-        return tomllib.loads(text)
-    # Besides its own error the parser passes on those of numbers with thousands of digits and of
-    # arrays nested thousands deep.
-    except (ValueError, RecursionError) as error:
+        return _parsed(text)
+    # Besides its own error the parser passes on that of numbers with thousands of digits.
+    except ValueError as error:
         raise InputError(f"{owner}: not valid TOML: {error}") from error
+
+
+def _parsed(text: str) -> dict[str, Any]:
+    """Parse TOML; a ValueError if it cannot be, or is nested deeper than any parameters are."""
+    deep = f"nested deeper than {DEPTH_MAX} tables or arrays"
+    if _TOO_MANY_PARTS.search(text):
+        raise ValueError(deep)
+    try:
+        data = tomllib.loads(text)
+    except RecursionError:
+        raise ValueError(deep) from None
+    inside: list[Any] = [data]
+    for _ in range(DEPTH_MAX):
+        inside = [
+            inner
+            for each in inside
+            for inner in (each.values() if isinstance(each, dict) else each)
+            if isinstance(inner, dict | list)
+        ]
+    if inside:
+        raise ValueError(deep)
+    return data
 
 
 def validated(
@@ -65,11 +93,13 @@ def parse_setting(text: str) -> tuple[str, object]:
     key, separator, value = text.partition("=")
     key, value = key.strip(), value.strip()
     if not separator or not key or not value:
-        raise InputError(f"--set {text!r}: expected KEY=VALUE, e.g. thermal.t_amb_degc=-15")
+        given = shown_value(text)
+        raise InputError(f"--set {given}: expected KEY=VALUE, e.g. thermal.t_amb_degc=-15")
     try:
-        return key, tomllib.loads(f"value = {value}")["value"]
-    except (ValueError, RecursionError):
+        data = _parsed(f"value = {value}")
+    except ValueError:
         return key, value
+    return key, data["value"] if len(data) == 1 else value  # more than one: a value with newlines
 
 
 def parse_settings(texts: list[str]) -> dict[str, object]:
@@ -112,6 +142,7 @@ def _copy(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _unknown(dotted: str, part: str, place: dict[str, Any], owner: str) -> InputError:
+    key, unknown = shown_value(dotted), shown_value(part)
     return InputError(
-        f"{owner}: no parameter {dotted!r}: {part!r} is not one of {', '.join(sorted(place))}"
+        f"{owner}: no parameter {key}: {unknown} is not one of {', '.join(sorted(place))}"
     )

@@ -2,6 +2,7 @@
 those inside functions too, and every name of the registry and of the public face."""
 
 import ast
+import re
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -157,6 +158,23 @@ def test_every_shipped_name_leads_somewhere(table: Names) -> None:
                 if isinstance(target, ast.Name)
             }
             assert attribute in defined | assigned, f"{table.kind} {name}: {target}"
+
+
+def test_what_escapes_text_is_not_passed_by() -> None:
+    """Pages, tables and the console of the command line are made in one place each."""
+    users: dict[str, set[str]] = {"jinja2": set(), "rich.table": set()}
+    for name, file in MODULES.items():
+        for other in imported(ast.parse(file.read_text("utf-8"))):
+            if other in users:
+                users[other].add(name)
+    assert users == {
+        "jinja2": {"qpmpc.report.html", "qpmpc.codegen.generate"},
+        "rich.table": {"qpmpc.report.table"},
+    }
+    for package in FOLDERS.values():
+        for template in package.rglob("*.html.j2"):
+            words = re.findall(r"\w+", template.read_text("utf-8"))
+            assert not {"safe", "autoescape"} & set(words), template
 
 
 def test_a_wrong_target_would_be_noticed() -> None:

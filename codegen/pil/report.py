@@ -2,20 +2,18 @@
 
 from base64 import b64encode
 from collections.abc import Sequence
-from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
-
-from jinja2 import Environment, StrictUndefined
-from rich.table import Table
 
 from qpmpc.codegen.pil.loop import PilResult
 from qpmpc.codegen.pil.pareto import Pareto
 from qpmpc.controllers.monitor import Flag
 from qpmpc.files import json_text, write_bytes, write_text
 from qpmpc.report.columns import violations_text
+from qpmpc.report.html import html_page
 from qpmpc.report.provenance import provenance
+from qpmpc.report.table import ShownTable
 from qpmpc.solvers.settings import AdmmSettings
 
 FLIPS_SHOWN = 8
@@ -104,9 +102,9 @@ def write_pareto(pareto: Pareto, folder: Path) -> list[str]:
     return [f"{folder / stem}.json, .png, .html written"]
 
 
-def pareto_table(rows: Sequence[dict[str, Any]]) -> Table:
+def pareto_table(rows: Sequence[dict[str, Any]]) -> ShownTable:
     """Return one line per run for the terminal."""
-    table = Table(title=f"{rows[0]['cycle']}: fuel against instructions on a Cortex-M7")
+    table = ShownTable(title=f"{rows[0]['cycle']}: fuel against instructions on a Cortex-M7")
     for name in ("algorithm", "precision"):
         table.add_column(name)
     for name in ("K", "instructions per step", "spread %", "flash B", "RAM B", "above DP %"):
@@ -140,9 +138,9 @@ def _html(
 ) -> str:
     """Return the report: one self-contained page."""
     times = rows[0]["milliseconds_estimated"]
-    template = files("qpmpc.codegen.pil").joinpath("pil.html.j2").read_text("utf-8")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    return environment.from_string(template).render(
+    return html_page(
+        "qpmpc.codegen.pil",
+        "pil.html.j2",
         cycle=shown.run.cycle,
         vehicle=shown.run.vehicle,
         rows=rows,

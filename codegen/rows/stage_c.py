@@ -19,7 +19,7 @@ FORMULAS: tuple[Callable[..., Any], ...] = (  # Python functions translated into
 )
 FUNCTIONS = {
     **{name: f"real_{name}" for name in ("min", "max")},
-    **{name: f"REAL_{name.upper()}" for name in ("exp", "expm1", "log")},
+    **{name: f"REAL_{name.upper()}" for name in ("exp", "expm1", "log1p")},
     **{name: f"mpc_{name}" for name in ("pwa_alpha", "pwa_alpha_slope", "pwa_battery")},
     **{function.__name__: f"heat_{function.__name__}" for function in FORMULAS},
 }

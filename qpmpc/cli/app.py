@@ -18,6 +18,7 @@ from qpmpc.cli.simulate import simulate
 from qpmpc.cli.vehicles import vehicles
 from qpmpc.cli.verify import verify
 from qpmpc.errors import InputError, QpmpcError
+from qpmpc.shown import shown
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 DEBUG_VARIABLE = "QPMPC_DEBUG"
@@ -99,11 +100,16 @@ def _one_line(error: Exception) -> str:
         return str(error)
     if hasattr(error, "format_message"):
         command = getattr(getattr(error, "ctx", None), "command_path", "qpmpc")
-        return f"{error.format_message().rstrip('.')} (see {command} --help)"
+        return f"{_folded(error.format_message()).rstrip('.')} (see {command} --help)"
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
-    return f"{type(error).__name__}: {error} ({DEBUG_VARIABLE}=1 shows where)"
+    return f"{type(error).__name__}: {_folded(str(error))} ({DEBUG_VARIABLE}=1 shows where)"
+
+
+def _folded(text: str) -> str:
+    """Return the message of another package on one line."""
+    return " ".join(text.split())
 
 
 def _say(text: str) -> None:
-    print(f"qpmpc: {' '.join(text.split())}", file=sys.stderr)
+    print(f"qpmpc: {shown(text)}", file=sys.stderr)

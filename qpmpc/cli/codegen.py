@@ -80,5 +80,4 @@ def codegen(
     result_console().print(
         f"{folder}: {len(files)} files written, target {target}, {precision}, {algorithm}, "
         f"{sizes.stages} stages, {values.iterations} iterations per step; start with README.md",
-        markup=False,
     )

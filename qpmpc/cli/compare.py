@@ -61,4 +61,4 @@ def compare(
     console = result_console(json_file)
     print_rows(console, rows, COMPARE_COLUMNS, "cycle")
     for remark in remarks:
-        console.print(remark, markup=False)
+        console.print(remark)

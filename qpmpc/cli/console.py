@@ -10,14 +10,21 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from qpmpc.cli.inputs import STDOUT
+from qpmpc.cli.stdout import to_stderr
 from qpmpc.controllers.base import Progress as Report
 from qpmpc.files import json_text, write_text
+from qpmpc.shown import shown
 
 UNLIMITED_WIDTH = 1000
 
 
 class _Console(Console):
-    """Console that leaves a broken pipe to `main`."""
+    """Console that prints text as it is, control characters escaped; `main` gets broken pipes."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print text without markup, or a table."""
+        plain = (shown(each) if isinstance(each, str) else each for each in objects)
+        super().print(*plain, **{"markup": False, **options})
 
     def on_broken_pipe(self) -> None:
         """Raise, where rich would exit with code 1."""
@@ -55,6 +62,7 @@ class ProgressBar:
         """Start a job; returns the function to call with its progress."""
         done_before = self._begun
         self._begun += 1
+        title = shown(title)
         label = f"{title} ({self._begun}/{self._jobs})" if self._jobs > 1 else title
         self._progress.update(self._task, description=label, completed=float(done_before))
 
@@ -66,15 +74,18 @@ class ProgressBar:
 
 @contextmanager
 def progress_bar(jobs: int) -> Iterator[ProgressBar]:
-    """Show a progress bar while the block runs; it leaves no trace."""
+    """Show a progress bar while the block runs; neither it nor a solver writes to stdout."""
     console = Console(stderr=True)
-    with Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    ) as progress:
+    with (
+        to_stderr(),
+        Progress(
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            TaskProgressColumn(),
+            TimeRemainingColumn(),
+            console=console,
+            transient=True,
+            disable=not console.is_terminal,
+        ) as progress,
+    ):
         yield ProgressBar(progress, jobs)

@@ -54,24 +54,24 @@ def cycles(
     for title in ("title", "source", "licence", "note") if entry else ():
         text = getattr(entry, title)
         if text:
-            console.print(f"{title}: {text}", markup=False)
+            console.print(f"{title}: {text}")
     if out is not None:
         for remark in write_cycle(cycle, out):
-            console.print(remark, markup=False)
+            console.print(remark)
 
 
 def _list(console: "Console", rows: "list[tuple[Cycle, CatalogueEntry | None]]") -> None:
     from rich import box
-    from rich.table import Table
-    from rich.text import Text
 
-    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
+    from qpmpc.report.table import ShownTable
+
+    table = ShownTable(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
     table.add_column("cycle", overflow="fold")
     for title in ("duration", "distance", "mean speed", "max speed"):
         table.add_column(title, justify="right", no_wrap=True)
     for i, (cycle, entry) in enumerate(rows):
         published = entry.published if entry else None
-        table.add_row(Text(cycle.name), *_measured(cycle))
+        table.add_row(cycle.name, *_measured(cycle))
         if published:
             figures = (
                 published.duration,

@@ -94,10 +94,10 @@ def _one_run(
     write_json(result.summary(), json_file)
     console = result_console(json_file)
     for line in pil_lines(result):
-        console.print(line, markup=False)
+        console.print(line)
     if out is not None:
         for remark in write_pil(result, out):
-            console.print(remark, markup=False)
+            console.print(remark)
 
 
 def _pareto(
@@ -119,4 +119,4 @@ def _pareto(
     console.print(pareto_table(found.rows()))
     if out is not None:
         for remark in write_pareto(found, out):
-            console.print(remark, markup=False)
+            console.print(remark)

@@ -56,5 +56,5 @@ def reproduce(
     console = result_console(json_file)
     for check in data["checks"]:
         mark = "holds" if check["holds"] else "DOES NOT HOLD"
-        console.print(f"{mark:13}  {check['name']}: {check['measured']}", markup=False)
-    console.print(f"{page} written", markup=False)
+        console.print(f"{mark:13}  {check['name']}: {check['measured']}")
+    console.print(f"{page} written")

@@ -70,4 +70,4 @@ def simulate(
     console = result_console(json_file)
     print_rows(console, [summary], SIMULATE_COLUMNS, "cycle")
     for remark in remarks:
-        console.print(remark, markup=False)
+        console.print(remark)

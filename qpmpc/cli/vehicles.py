@@ -7,9 +7,8 @@ import typer
 from qpmpc.cli.options import OutOption
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from qpmpc.report.pwa_curves import PwaCurve
+    from qpmpc.report.table import ShownTable
     from qpmpc.vehicle import Vehicle
 
 
@@ -64,26 +63,26 @@ def vehicles(
     console = result_console()
     if name is None:
         for known in VEHICLES.names():
-            console.print(f"{known}: {load_vehicle(known).description}", markup=False)
+            console.print(f"{known}: {load_vehicle(known).description}")
         return
     vehicle = load_vehicle(name)
     curves = pwa_curves(vehicle)
-    console.print(f"{vehicle.name}: {vehicle.description}", markup=False)
+    console.print(f"{vehicle.name}: {vehicle.description}")
     console.print(_parameters(vehicle))
     console.print("Piecewise-affine models of the controllers, with proven error bounds")
     console.print(_pwa(curves))
     if out is not None:
         for remark in write_pwa(vehicle, curves, out):
-            console.print(remark, markup=False)
+            console.print(remark)
 
 
-def _parameters(vehicle: "Vehicle") -> "Table":
+def _parameters(vehicle: "Vehicle") -> "ShownTable":
     from rich import box
-    from rich.table import Table
 
+    from qpmpc.report.table import ShownTable
     from qpmpc.report.units import unit_of
 
-    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
+    table = ShownTable(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
     table.add_column("parameter", no_wrap=True)
     table.add_column("value", overflow="fold")
     table.add_column("unit", no_wrap=True)
@@ -96,11 +95,12 @@ def _parameters(vehicle: "Vehicle") -> "Table":
     return table
 
 
-def _pwa(curves: "list[PwaCurve]") -> "Table":
+def _pwa(curves: "list[PwaCurve]") -> "ShownTable":
     from rich import box
-    from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
+    from qpmpc.report.table import ShownTable
+
+    table = ShownTable(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
     table.add_column("curve", overflow="fold")
     table.add_column("pieces", justify="right")
     table.add_column("breakpoints", overflow="fold")

@@ -39,13 +39,12 @@ def verify(
     """
     from time import perf_counter
 
-    from rich.table import Table
-
     from qpmpc.cli.console import progress_bar, result_console, write_json
     from qpmpc.cli.inputs import check_outputs
     from qpmpc.errors import InputError
     from qpmpc.files import json_text, write_text
     from qpmpc.registry import CHECKS
+    from qpmpc.report.table import ShownTable
 
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
@@ -77,7 +76,7 @@ def verify(
         write_text(out / "verify.json", json_text(results.summary()))
         write_text(out / "verify.html", verification_html(results))
     console = result_console(json_file)
-    table = Table(box=None)
+    table = ShownTable(box=None)
     for column in ("check", "measured", "tolerance", "unit", "verdict"):
         table.add_column(column, justify="right" if column in ("measured", "tolerance") else "left")
     for check in results.checks:
@@ -93,10 +92,10 @@ def verify(
     console.print(table)
     for check in results.checks:
         if not check.passed:
-            console.print(f"{check.name}: {check.claim} {check.detail}", markup=False)
+            console.print(f"{check.name}: {check.claim} {check.detail}")
     passed = sum(check.passed for check in results.checks)
     console.print(f"{passed} of {len(results.checks)} checks passed")
     if out is not None:
-        console.print(f"{out / 'verify.html'}, .json written", markup=False)
+        console.print(f"{out / 'verify.html'}, .json written")
     if not results.passed:
         raise typer.Exit(1)

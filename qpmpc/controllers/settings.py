@@ -1,12 +1,14 @@
 """Settings of the shipped controllers, and their dotted names."""
 
+import re
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from qpmpc.errors import InputError
 from qpmpc.preview.horizon import HorizonSettings
+from qpmpc.problems import shown_value
 from qpmpc.pwa.model import PwaTolerances
 from qpmpc.qp.scaling import ScalingSettings
 from qpmpc.qp.stage_qp import QpSettings
@@ -14,10 +16,10 @@ from qpmpc.settings import apply_settings, validated
 from qpmpc.solvers.settings import AdmmSettings
 
 Model = TypeVar("Model", bound=BaseModel)
-Watts = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-Factor = Annotated[float, Field(ge=0.0, le=20.0, allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Watts = Annotated[float, Field(ge=0.0, le=1e6)]  # beyond any engine and battery together
+Celsius = Annotated[float, Field(ge=-100.0, le=150.0)]
+Factor = Annotated[float, Field(ge=0.0, le=20.0)]
+Gain = Annotated[float, Field(ge=0.0, le=1e4)]  # 1: a whole factor within 0.0001 of SOC
 
 
 class RuleBasedSettings(BaseModel):
@@ -38,7 +40,7 @@ class RuleBasedSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    k_soc_w: Watts = 100e3
+    k_soc_w: Annotated[float, Field(ge=0.0, le=1e8)] = 100e3
     balance: bool = True
     soc_ref_offset: Annotated[float, Field(ge=-0.3, le=0.3)] = 0.0
     on_w: Watts = 8e3
@@ -46,9 +48,17 @@ class RuleBasedSettings(BaseModel):
     min_on_s: Annotated[int, Field(ge=0, le=600)] = 5
     power_min_w: Watts = 8e3
     heat_power_w: Watts = 4e3
-    heat_on_degc: float = 50.0
-    heat_off_degc: float = 52.0
+    heat_on_degc: Celsius = 50.0
+    heat_off_degc: Celsius = 52.0
     soc_forced: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.45
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.off_w > self.on_w:
+            raise ValueError("off_w must not be above on_w")
+        if self.heat_on_degc > self.heat_off_degc:
+            raise ValueError("heat_on_degc must not be above heat_off_degc")
+        return self
 
 
 class MhQpSettings(BaseModel):
@@ -137,13 +147,19 @@ class EcmsSettings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     factor: Factor = 2.7
-    factor_per_soc: NotNegative = 10.0
-    factor_per_soc_s: NotNegative = 0.02
+    factor_per_soc: Gain = 10.0
+    factor_per_soc_s: Gain = 0.02
     factor_min: Factor = 1.5
     factor_max: Factor = 5.0
-    t_cl_band_k: Positive = 3.0
+    t_cl_band_k: Annotated[float, Field(ge=0.01, le=100.0)] = 3.0
     heat_factor: Factor = 1.5
     power_step_w: Annotated[float, Field(ge=10.0, le=10e3)] = 250.0
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.factor_min > self.factor_max:
+            raise ValueError("factor_min must not be above factor_max")
+        return self
 
 
 class ControllerSettings(BaseModel):
@@ -204,7 +220,7 @@ class ControllerSettings(BaseModel):
             section, _, rest = key.partition(".")
             if not rest:
                 raise InputError(
-                    f"no parameter {key!r}: names start with a section and a dot, "
+                    f"no parameter {shown_value(key)}: names start with a section and a dot, "
                     "such as mh_qp.admm.iterations"
                 )
             if section in self.sections():
@@ -230,7 +246,7 @@ def refuse_old_name(key: str, value: object) -> None:
         One line with the new name.
     """
     section, _, rest = key.partition(".")
-    if section not in ("mh_qp", "mh_qp_paper", "baseline_mpc"):
+    if section not in ("mh_qp", "mh_qp_paper", "baseline_mpc") or not re.fullmatch(r"[\w.]+", rest):
         return
     for old, new in RENAMED.items():
         if rest == old or rest.startswith(f"{old}."):

@@ -96,6 +96,9 @@ def sentences(faults: dict[str, Any]) -> list[str]:
 
 def _added(faulted: Run, unfaulted: Run) -> dict[str, float]:
     """Excess over the limits beyond that of the unfaulted run."""
-    before: dict[str, float] = unfaulted.summary()["violations"]
-    after: dict[str, float] = faulted.summary()["violations"]
-    return {name: max(after[name] - before[name], 0.0) for name in after}
+    fields = {"soc": "soc", "t_cl_degc": "t_cl_k", "power_w": "power_w"}
+    most = [
+        {name: float(getattr(run.excess, field).max()) for name, field in fields.items()}
+        for run in (unfaulted, faulted)
+    ]
+    return {name: max(most[1][name] - most[0][name], 0.0) for name in fields}

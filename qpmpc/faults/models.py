@@ -2,19 +2,19 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from qpmpc.errors import InputError
 from qpmpc.faults.kinds import KINDS, KindName, SignalName
+from qpmpc.input_text import read_text
 from qpmpc.settings import load_toml, validated
 
 LARGEST_VALUE = 1e9
 LONGEST_S = 1_000_000
 MOST_FAULTS = 1000
-LARGEST_FILE = 1_000_000  # bytes
+MEGABYTES_MAX = 1
 
 
 class Fault(BaseModel):
@@ -111,17 +111,7 @@ def load_faults(path: str | os.PathLike[str]) -> Faults:
         fault and key.
     """
     label = os.fspath(path)
-    try:
-        with Path(path).open("rb") as file:
-            content = file.read(LARGEST_FILE + 1)
-        if len(content) > LARGEST_FILE:
-            raise InputError(f"faults file {label}: larger than {LARGEST_FILE} bytes")
-        text = content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError(f"cannot read faults file {label}: not a UTF-8 text file") from error
-    except (OSError, ValueError) as error:  # ValueError: a path with a null character
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"cannot read faults file {label}: {reason}") from error
+    text = read_text(path, MEGABYTES_MAX, "faults file ")
     data = load_toml(text, label)
     found = data.get("fault")
     if list(data) != ["fault"] or not isinstance(found, list):

@@ -1,8 +1,13 @@
 """The multi-horizon grid: a short, fine horizon and a long, coarse one that shrinks to arrival."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from qpmpc.errors import InputError
+
+BLOCKS_MAX = 500
+"""Of a trip: memory and time of a step grow with them; a block of a day's drive is then 3 min."""
 
 
 class HorizonSettings(BaseModel):
@@ -21,11 +26,17 @@ class HorizonSettings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     short_stages: Annotated[int, Field(ge=1, le=2000)] = 20
-    blocks: Annotated[int, Field(ge=0, le=500)] = 7
+    blocks: Annotated[int, Field(ge=0, le=BLOCKS_MAX)] = 7
     block_s: Annotated[int, Field(ge=0, le=3600)] = 120
     classes: Literal[1, 3] = 3
-    class_hard_w: float = 8000.0
-    class_braking_w: float = -500.0
+    class_hard_w: Annotated[float, Field(ge=-1e6, le=1e6)] = 8000.0
+    class_braking_w: Annotated[float, Field(ge=-1e6, le=1e6)] = -500.0
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.class_braking_w > self.class_hard_w:
+            raise ValueError("class_braking_w must not be above class_hard_w")
+        return self
 
     def block_length_s(self, trip_steps: int) -> int:
         """Length of a block for a trip of that many 1 s steps, 0 if there are none."""
@@ -35,11 +46,22 @@ class HorizonSettings(BaseModel):
         """Number of blocks for a trip of that many 1 s steps; the last may be empty.
 
         A number that is set holds for every trip, as in generated code.
+
+        Raises
+        ------
+        InputError
+            If `block_s` cuts the trip into more than `BLOCKS_MAX`.
         """
         if self.blocks:
             return self.blocks
         length_s = self.block_length_s(trip_steps)
-        return -(-trip_steps // length_s) if length_s else 0
+        count = -(-trip_steps // length_s) if length_s else 0
+        if count > BLOCKS_MAX:
+            raise InputError(
+                f"horizon.block_s={length_s} cuts a trip of {trip_steps} s into {count} blocks, at "
+                f"most {BLOCKS_MAX} are allowed: set horizon.blocks, or a longer block_s"
+            )
+        return count
 
     def stage_count(self, trip_steps: int) -> int:
         """Number of stages, the same from departure to arrival."""

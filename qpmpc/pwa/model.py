@@ -12,7 +12,6 @@ from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.engine import OptimalLine, alpha
 from qpmpc.vehicle.parameters import Vehicle
 
-Tolerance = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 BATTERY_STEP_W = 25.0
 ALPHA_STEP_K = 0.05
 ALPHA_COLDEST_DEGC = -20.0
@@ -20,7 +19,7 @@ ALPHA_HOTTEST_DEGC = 95.0
 
 
 class PwaTolerances(BaseModel):
-    """Largest PWA errors; the number of pieces follows from them.
+    """Largest PWA errors; the number of pieces follows from them: some tens at the least ones.
 
     Attributes
     ----------
@@ -32,11 +31,11 @@ class PwaTolerances(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    fuel_g_per_s: Tolerance = 0.0015
-    fuel_knee_w: Tolerance = 20e3
-    battery_w: Tolerance = 6.0
+    fuel_g_per_s: Annotated[float, Field(ge=1e-5, le=10.0)] = 0.0015
+    fuel_knee_w: Annotated[float, Field(ge=100.0, le=1e6)] = 20e3
+    battery_w: Annotated[float, Field(ge=0.1, le=1e5)] = 6.0
     battery_share: Annotated[float, Field(ge=0.0, le=0.1)] = 0.006
-    alpha: Tolerance = 0.001
+    alpha: Annotated[float, Field(ge=1e-5, le=1.0)] = 0.001
 
 
 @dataclass(frozen=True)

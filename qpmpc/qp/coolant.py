@@ -4,7 +4,7 @@ The functions are in the subset of `qpmpc.qp.expressions`: the generated C is ma
 """
 
 import numpy as np
-from numpy import exp, expm1, log, where
+from numpy import exp, expm1, log1p, where
 from numpy.typing import NDArray
 
 from qpmpc.vehicle.parameters import Thermal
@@ -16,10 +16,12 @@ def radiator_w_per_k(th: Thermal) -> float:
     """Slope of the radiator's heat over its thermostat's span, W/K.
 
     The chord from closed to fully open, UA_rad (T_max - T_amb) / span: within its span the true
-    curve, a parabola, lies at most UA_rad span / 4 below.
+    curve, a parabola, lies at most UA_rad span / 4 below. Without a radiator, or where the limit
+    is below the ambient temperature, it is not 0 but so small that it takes no heat: what follows
+    divides by it.
     """
     full_w = th.radiator_w_per_k * (th.t_cl_max_degc - th.t_amb_degc)
-    return full_w / th.thermostat_span_k
+    return max(full_w / th.thermostat_span_k, 1e-3)
 
 
 def thermostat_step(
@@ -59,11 +61,11 @@ def thermostat_step(
     settled = where(ever > 0.0, -expm1(open_for), 0.0)  # 1 - decay, exact for short stages too
     # the exponential, for as long as it is open; then the line, from u = 0
     apart = start_k - aim
-    curved = aim + apart * decay
+    curved = start_k * decay + aim * settled  # no difference of large numbers for a small slope
     closes = where(start_k >= 0.0, where(curved < 0.0, 1.0, 0.0), 0.0)
     shut = where(closes > 0.0, apart, 1.0)
-    ratio = where(closes > 0.0, shut / where(closes > 0.0, -aim, 1.0), 1.0)
-    line_s = duration_s - where(closes > 0.0, tau * log(ratio), 0.0)
+    share = where(closes > 0.0, start_k / where(closes > 0.0, -aim, 1.0), 0.0)
+    line_s = duration_s - where(closes > 0.0, tau * log1p(share), 0.0)
 
     uncrossed = where(start_k >= 0.0, curved, straight)
     crossed = where(closes > 0.0, heat_w * line_s / capacity, uncrossed)
@@ -74,6 +76,6 @@ def thermostat_step(
     by_curve = settled / slope
     by_line = duration_s / capacity
     line = where(start_k >= 0.0, by_curve, by_line)
-    bent = where(closes > 0.0, line_s / capacity + (1.0 + aim / shut) / slope, line)
+    bent = where(closes > 0.0, line_s / capacity + start_k / shut / slope, line)
     per_heat = where(opens > 0.0, by_curve + decay * closed_s / capacity, bent)
     return over_k, per_heat, per_start

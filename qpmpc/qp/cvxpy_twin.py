@@ -184,7 +184,8 @@ class CvxpyTwin:
         try:
             self.problem.solve(solver=solver, **options)
         except cp.SolverError as error:
-            raise QpmpcError(f"cvxpy twin: {solver}: {error}") from error
+            reason = " ".join(str(error).split())
+            raise QpmpcError(f"cvxpy twin: {solver}: {reason}") from error
         if self.problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
             raise QpmpcError(f"cvxpy twin: {solver} ends with {self.problem.status!r}")
         return np.column_stack([np.asarray(self._x[Entry(var, False)].value) for var in Var])

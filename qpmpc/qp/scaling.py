@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Floats = NDArray[np.float64]
 
 
@@ -16,7 +15,8 @@ class ScalingSettings(BaseModel):
 
     Attributes
     ----------
-    power_w, fuel_g_per_s, t_cl_k : one solver unit of each quantity
+    power_w, fuel_g_per_s, t_cl_k : one solver unit of each quantity; within a factor of some
+        thousand of its size, beyond which no solver converges
     energy_j : one solver unit of SOC, as battery energy
     duration_exponent : a stage's rates are counted in units / h^exponent, so that a long stage's
         variables, which weigh more, are resolved finer; 1 makes them energies, 0 plain rates
@@ -24,10 +24,10 @@ class ScalingSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    power_w: Positive = 10e3
-    fuel_g_per_s: Positive = 1.0
-    energy_j: Positive = 40e3
-    t_cl_k: Positive = 2.0
+    power_w: Annotated[float, Field(ge=10.0, le=10e6)] = 10e3
+    fuel_g_per_s: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0
+    energy_j: Annotated[float, Field(ge=40.0, le=40e6)] = 40e3
+    t_cl_k: Annotated[float, Field(ge=1e-3, le=1e3)] = 2.0
     duration_exponent: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
 
 

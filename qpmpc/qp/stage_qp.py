@@ -2,16 +2,17 @@
 
 from dataclasses import dataclass
 from types import CodeType
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from qpmpc.errors import InputError
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.expressions import code_of, expression
+from qpmpc.qp.heat_reserve import heat_reserve_k
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.quantities import Quantities
 from qpmpc.qp.rows import ROWS, SHORTEST_SCALE_S, VARIABLES, VARS, Rows, Var, cost_terms, states
@@ -20,7 +21,6 @@ from qpmpc.qp.structure import QpStructure
 from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
-Weight = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 T_CL_MAX_MARGIN_K = 0.05  # small: the radiator is fully open only at the limit itself
 LEAST_COST = 1e-9  # of any fuel entry: where all stages are masked the cost is scaled by this
@@ -35,7 +35,8 @@ class QpSettings(BaseModel):
     soc_penalty_g : lambda of a quadratic terminal cost, g per (unit SOC)^2, instead of the band
     soc_reserve : share of the room between the lower SOC limit and the initial SOC that stages of
         more than 1 s are planned to leave, for errors of the forecast
-    t_cl_margin_k : the coolant is planned to stay this far above its lower limit
+    t_cl_margin_k : the coolant is planned to stay this far above its lower limit, beside the
+        reserve of `heat_reserve_k`
     slack_g_per_k : price of exceeding a coolant limit, g per K and stage
     regularisation : quadratic cost on rates and slack in solver units, far below any fuel
     """
@@ -44,11 +45,17 @@ class QpSettings(BaseModel):
 
     terminal_low: Annotated[float, Field(gt=0.0, le=1.5)] = 1.0
     terminal_high: Annotated[float, Field(gt=0.0, le=1.5)] = 1.01
-    soc_penalty_g: Annotated[float, Field(ge=0.0)] = 0.0
+    soc_penalty_g: Annotated[float, Field(ge=0.0, le=1e9)] = 0.0
     soc_reserve: Annotated[float, Field(ge=0.0, le=0.9)] = 0.42
     t_cl_margin_k: Annotated[float, Field(ge=0.0, le=10.0)] = 0.5
-    slack_g_per_k: Weight = 10.0
+    slack_g_per_k: Annotated[float, Field(ge=1e-6, le=1e6)] = 10.0
     regularisation: Annotated[float, Field(ge=0.0, le=1.0)] = 1e-5
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.terminal_low > self.terminal_high:
+            raise ValueError("terminal_low must not be above terminal_high")
+        return self
 
 
 @dataclass(frozen=True)
@@ -102,7 +109,7 @@ def qp_parameters(
         "terminal_soc_low": soc_low,
         "terminal_soc_high": soc_high,
         "soc_penalty_g": settings.soc_penalty_g,
-        "t_min_degc": thermal.t_cl_min_degc + settings.t_cl_margin_k,
+        "t_min_degc": thermal.t_cl_min_degc + settings.t_cl_margin_k + heat_reserve_k(vehicle),
         "t_max_degc": thermal.t_cl_max_degc - T_CL_MAX_MARGIN_K,
         "slack_g_per_k": settings.slack_g_per_k,
         "regularisation": settings.regularisation,

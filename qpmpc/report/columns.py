@@ -97,8 +97,8 @@ def notes(rows: Sequence[Row]) -> list[str]:
     found = []
     if not all(row["comparable"] for row in rows):
         found.append(
-            f"{NOT_COMPARABLE} not comparable: the run ends so far from its initial SOC that the "
-            "correction exceeds 3 % of its fuel"
+            f"{NOT_COMPARABLE} not comparable: final SOC too far from the initial one, a limit "
+            "exceeded, or mostly on fallbacks; the remarks say which"
         )
     if any(not r["comparable"] and r["controller"] in ("rule-based", "dp") for r in rows):
         found.append("  percentages against such a run are no more certain than the run itself")

@@ -3,14 +3,13 @@
 import json
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, StrictUndefined
 
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.report.columns import COMPARE_COLUMNS, Row, filled, notes
+from qpmpc.report.html import html_page, preformatted
 from qpmpc.report.provenance import provenance
 from qpmpc.report.units import unit_of
 from qpmpc.results import INTEGRAL, OPTIMUM, REFERENCE, Run
@@ -39,9 +38,9 @@ def compare_html(
         names.add("mh_qp")  # has its horizon and limits
     if settings.others:
         names.add("others")
-    template = files("qpmpc.report").joinpath("compare.html.j2").read_text("utf-8")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    return environment.from_string(template).render(
+    return html_page(
+        "qpmpc.report",
+        "compare.html.j2",
         vehicle=vehicle,
         columns=columns,
         rows=rows,
@@ -60,7 +59,7 @@ def compare_html(
             for section, values in vehicle.model_dump(exclude={"name", "description"}).items()
             for key, value in values.items()
         ],
-        settings=json.dumps(settings.model_dump(include=names), indent=2),
+        settings=preformatted(json.dumps(settings.model_dump(include=names), indent=2)),
         provenance=provenance(),
     )
 

@@ -5,6 +5,9 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from qpmpc.shown import is_plain, shown
 
 # Okabe and Ito, "Color Universal Design" (2008): safe with all common colour deficiencies.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
@@ -45,8 +48,18 @@ def tidy(axes: Axes) -> None:
     axes.xaxis.label.set_fontsize(8.5)
 
 
+def as_plain_text(figure: Figure) -> None:
+    """Take all text of a figure as it is: no formulas, control characters escaped."""
+    for text in figure.findobj(Text):
+        text.set_parse_math(False)
+        lines = text.get_text().split("\n")
+        if not all(map(is_plain, lines)):
+            text.set_text("\n".join(map(shown, lines)))
+
+
 def png(figure: Figure) -> bytes:
     """Render as PNG, without the date, so that equal results make equal files."""
+    as_plain_text(figure)
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
     return buffer.getvalue()

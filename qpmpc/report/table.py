@@ -1,6 +1,7 @@
 """Tables in the terminal that show every number even in a narrow window."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from rich import box
 from rich.console import Console
@@ -9,8 +10,20 @@ from rich.table import Table
 from rich.text import Text
 
 from qpmpc.report.columns import Column, Row, filled
+from qpmpc.shown import shown
 
 NAME_WIDTH = 20  # longer names of users' files are folded
+
+
+class ShownTable(Table):
+    """A table whose cells and title are plain text: no markup, control characters escaped."""
+
+    def __init__(self, title: str = "", **options: Any) -> None:
+        super().__init__(title=Text(shown(title), "table.title") if title else None, **options)
+
+    def add_row(self, *cells: Any, **options: Any) -> None:
+        """Add a row; its cells are `str`."""
+        super().add_row(*(Text(shown(cell)) for cell in cells), **options)
 
 
 def print_rows(
@@ -44,8 +57,8 @@ def _width(console: Console, table: Table) -> int:
     return Measurement.get(console, console.options.update(width=10_000), table).maximum
 
 
-def _table(rows: Sequence[Row], columns: Sequence[Column], section: str) -> Table:
-    table = Table(
+def _table(rows: Sequence[Row], columns: Sequence[Column], section: str) -> ShownTable:
+    table = ShownTable(
         box=box.SIMPLE_HEAD,
         show_edge=False,
         pad_edge=False,
@@ -54,11 +67,11 @@ def _table(rows: Sequence[Row], columns: Sequence[Column], section: str) -> Tabl
     )
     for column in columns:
         if column.is_name:
-            longest = max(len(column.title), *(len(column.text(row)) for row in rows))
+            longest = max(len(column.title), *(len(shown(column.text(row))) for row in rows))
             table.add_column(column.title, width=min(longest, NAME_WIDTH), overflow="fold")
         else:
             table.add_column(column.title, justify="right", no_wrap=True)
     for i, row in enumerate(rows):
         ends = i + 1 < len(rows) and rows[i + 1][section] != row[section]
-        table.add_row(*(Text(column.text(row)) for column in columns), end_section=ends)
+        table.add_row(*(column.text(row) for column in columns), end_section=ends)
     return table

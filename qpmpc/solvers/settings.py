@@ -4,8 +4,6 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-
 
 class AdmmSettings(BaseModel):
     """Settings of ADMM, OSQP's algorithm. Every step does the same arithmetic.
@@ -24,7 +22,7 @@ class AdmmSettings(BaseModel):
 
     iterations: Annotated[int, Field(ge=1, le=100_000)] = 50
     cold_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 4000
-    rho: Positive = 0.1
-    proximal_weight: Positive = 1e-6
-    relaxation: Annotated[float, Field(gt=0.0, lt=2.0)] = 1.6
-    status_tolerance: Annotated[float, Field(gt=0.0, lt=1.0)] = 1e-3
+    rho: Annotated[float, Field(ge=1e-6, le=1e6)] = 0.1  # as OSQP has it
+    proximal_weight: Annotated[float, Field(ge=1e-20, le=1e3)] = 1e-6
+    relaxation: Annotated[float, Field(ge=0.01, le=1.99)] = 1.6
+    status_tolerance: Annotated[float, Field(ge=1e-12, lt=1.0)] = 1e-3

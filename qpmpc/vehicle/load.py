@@ -12,10 +12,14 @@ from pathlib import Path
 from typing import Any
 
 from qpmpc.errors import InputError
+from qpmpc.input_text import read_text
 from qpmpc.problems import shown_value
 from qpmpc.settings import load_toml, validated
 from qpmpc.vehicle.names import DEFAULT_VEHICLE, VEHICLES
 from qpmpc.vehicle.parameters import Vehicle
+
+MEGABYTES_MAX = 1
+"""A vehicle's file has some kilobytes."""
 
 
 @dataclass(frozen=True)
@@ -114,14 +118,7 @@ def _read(name_or_path: str | os.PathLike[str], where: str) -> VehicleFile:
     path = Path(VEHICLES.find(label) if label in VEHICLES.added else label)
     if path.suffix != ".toml":
         raise InputError(f"{where}{VEHICLES.unknown(label)}")
-    try:
-        text = path.read_text("utf-8")
-    except UnicodeDecodeError as error:
-        reason = "not a UTF-8 text file"
-        raise InputError(f"{where}cannot read vehicle file {label}: {reason}") from error
-    except (OSError, ValueError) as error:  # ValueError: a path with a null character
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{where}cannot read vehicle file {label}: {reason}") from error
+    text = read_text(path, MEGABYTES_MAX, f"{where}vehicle file ")
     return VehicleFile(label, path, text, load_toml(text, label))
 
 

@@ -25,13 +25,23 @@ def _check_name(name: str) -> str:
 
 
 Name = Annotated[str, AfterValidator(_check_name)]
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
 Share = Annotated[float, Field(gt=0.0, lt=1.0)]
 Celsius = Annotated[float, Field(ge=-100.0, le=150.0)]
+# Most entries of an array; a measured map has tens.
+POINTS_MAX = 1000
 # Not strict: TOML's arrays are lists. Their entries are.
-Grid = Annotated[tuple[float, ...], Field(min_length=2, strict=False)]
-Table = Annotated[tuple[Positive, ...], Field(min_length=2, strict=False)]
+_ARRAY = Field(min_length=2, max_length=POINTS_MAX, strict=False)
+Speeds = Annotated[tuple[Annotated[float, Field(ge=10.0, le=20e3)], ...], _ARRAY]
+Friction = Annotated[tuple[Annotated[float, Field(ge=1e-4, le=10.0)], ...], _ARRAY]
+Torques = Annotated[tuple[Annotated[float, Field(ge=1.0, le=10e3)], ...], _ARRAY]
+Charges = Annotated[tuple[Annotated[float, Field(ge=-1.0, le=2.0)], ...], _ARRAY]
+Voltages = Annotated[tuple[Annotated[float, Field(ge=1.0, le=2e3)], ...], _ARRAY]
+Resistances = Annotated[tuple[Annotated[float, Field(ge=1e-5, le=100.0)], ...], _ARRAY]
+
+STEP_S = 1.0  # of plant and controllers: nothing may empty, heat or cool down within one
+COLDEST_DEGC = -50.0  # at which the cold engine's fuel is checked
+COLD_FACTOR_MAX = 10.0
+SPEED_MAX_MPS = 70.0  # at which forces and losses are checked
 
 
 class Section(BaseModel):
@@ -43,9 +53,9 @@ class Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
-def _require_increasing(name: str, values: tuple[float, ...]) -> None:
-    if any(b <= a for a, b in pairwise(values)):
-        raise ValueError(f"{name} must increase from entry to entry")
+def _require_increasing(name: str, values: tuple[float, ...], least: float) -> None:
+    if any(b - a < least for a, b in pairwise(values)):
+        raise ValueError(f"{name} must increase from entry to entry, by {least:g} or more")
 
 
 def _require_same_length(grid: tuple[float, ...], **tables: tuple[float, ...]) -> None:
@@ -55,31 +65,47 @@ def _require_same_length(grid: tuple[float, ...], **tables: tuple[float, ...]) -
 
 
 class Chassis(Section):
-    """Road load F = A + B v + C v^2 + m k dv/dt + m g grade, and driveline efficiencies."""
+    """Road load F = A + B v + C v^2 + m k dv/dt + m g grade, and driveline efficiencies.
 
-    mass_kg: Annotated[float, Field(ge=500.0, le=10000.0)]
+    From the smallest city car to a truck of 10 t. B may be negative, as some fits to coast-downs
+    have it, but the road may push the car at no speed.
+    """
+
+    mass_kg: Annotated[float, Field(ge=500.0, le=10e3)]
     rotating_mass_factor: Annotated[float, Field(ge=1.0, le=1.5)]
-    road_load_a_n: NonNegative
-    road_load_b_n_per_mps: float
-    road_load_c_n_per_mps2: NonNegative
-    eta_drive: Annotated[float, Field(gt=0.0, le=1.0)]
+    road_load_a_n: Annotated[float, Field(ge=0.0, le=5e3)]  # 5 % of the weight of 10 t
+    road_load_b_n_per_mps: Annotated[float, Field(ge=-100.0, le=500.0)]  # 500: 10 t, 70 m/s, 36 %
+    road_load_c_n_per_mps2: Annotated[float, Field(ge=0.0, le=20.0)]  # c_d A of 33 m^2
+    eta_drive: Annotated[float, Field(ge=0.1, le=1.0)]
     eta_regen: Annotated[float, Field(ge=0.0, le=1.0)]
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        a, b, c = self.road_load_a_n, self.road_load_b_n_per_mps, self.road_load_c_n_per_mps2
+        lowest_at = min(-b / (2.0 * c), SPEED_MAX_MPS) if c > 0.0 else SPEED_MAX_MPS
+        least = a + lowest_at * (b + c * lowest_at)
+        if b < 0.0 and least < 0.0:
+            raise ValueError(
+                f"road_load_b_n_per_mps must not make the road load negative: it is {least:.3g} N "
+                f"at {lowest_at:.3g} m/s"
+            )
+        return self
 
 
 class Engine(Section):
     """Fuel map P_fuel = K(N) V_L N/60 + P_eng / indicated efficiency, torque limit, fuel."""
 
-    displacement_l: Positive
-    power_max_w: Positive
-    power_min_w: NonNegative
-    lhv_j_per_kg: Annotated[float, Field(ge=1e7, le=1.5e8)]
-    density_kg_per_l: Positive
-    indicated_efficiency: Share
-    friction_speed_rpm: Table
-    friction_kj_per_rev_l: Table
-    torque_speed_rpm: Table
-    torque_max_nm: Table
-    start_fuel_g: NonNegative
+    displacement_l: Annotated[float, Field(ge=0.05, le=20.0)]
+    power_max_w: Annotated[float, Field(ge=500.0, le=500e3)]
+    power_min_w: Annotated[float, Field(ge=0.0, le=500e3)]
+    lhv_j_per_kg: Annotated[float, Field(ge=1e7, le=1.5e8)]  # methanol 2e7, hydrogen 1.2e8
+    density_kg_per_l: Annotated[float, Field(ge=1e-5, le=2.0)]  # hydrogen gas 8e-5
+    indicated_efficiency: Annotated[float, Field(ge=0.15, le=0.8)]  # 0.8: far above any engine
+    friction_speed_rpm: Speeds
+    friction_kj_per_rev_l: Friction
+    torque_speed_rpm: Speeds
+    torque_max_nm: Torques
+    start_fuel_g: Annotated[float, Field(ge=0.0, le=10.0)]  # burnt within a second
 
     @property
     def lhv_j_per_g(self) -> float:
@@ -88,12 +114,16 @@ class Engine(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _require_increasing("friction_speed_rpm", self.friction_speed_rpm)
-        _require_increasing("torque_speed_rpm", self.torque_speed_rpm)
+        _require_increasing("friction_speed_rpm", self.friction_speed_rpm, least=1.0)
+        _require_increasing("torque_speed_rpm", self.torque_speed_rpm, least=1.0)
         _require_same_length(
             self.friction_speed_rpm, friction_kj_per_rev_l=self.friction_kj_per_rev_l
         )
         _require_same_length(self.torque_speed_rpm, torque_max_nm=self.torque_max_nm)
+        low = max(self.friction_speed_rpm[0], self.torque_speed_rpm[0])
+        high = min(self.friction_speed_rpm[-1], self.torque_speed_rpm[-1])
+        if high <= low:
+            raise ValueError("friction_speed_rpm and torque_speed_rpm must have speeds in common")
         if self.power_min_w >= self.power_max_w:
             raise ValueError("power_min_w must be below power_max_w")
         return self
@@ -102,24 +132,39 @@ class Engine(Section):
 class ColdEngine(Section):
     """Cold multiplier alpha(T) = 1 + k ((T_hot - T)/span)^exponent below T_hot, else 1."""
 
-    k: NonNegative
+    k: Annotated[float, Field(ge=0.0, le=10.0)]
     hot_degc: Celsius
-    span_k: Positive
+    span_k: Annotated[float, Field(ge=1.0, le=500.0)]
     exponent: Annotated[float, Field(ge=1.0, le=4.0)]
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        below_k = max(self.hot_degc - COLDEST_DEGC, 0.0)
+        alpha = 1.0 + self.k * (below_k / self.span_k) ** self.exponent
+        if alpha > COLD_FACTOR_MAX:
+            raise ValueError(
+                f"k, span_k and exponent multiply fuel by {alpha:.3g} at {COLDEST_DEGC:g} degC, at "
+                f"most {COLD_FACTOR_MAX:g} are allowed"
+            )
+        return self
 
 
 class Thermal(Section):
-    """Coolant as one heat store: capacity, losses, thermostat, cabin heat and limits."""
+    """Coolant as one heat store: capacity, losses, thermostat, cabin heat and limits.
 
-    heat_capacity_j_per_k: Positive
+    A radiator of 0 W/K is none. The capacity is at least that of a litre of water, at most so
+    large that the temperature stays; the losses may cool it no faster than within a step.
+    """
+
+    heat_capacity_j_per_k: Annotated[float, Field(ge=4e3, le=1e9)]
     exhaust_share: Share
-    ua0_w_per_k: NonNegative
-    ua1_w_per_k_per_mps: NonNegative
+    ua0_w_per_k: Annotated[float, Field(ge=0.0, le=10e3)]
+    ua1_w_per_k_per_mps: Annotated[float, Field(ge=0.0, le=1e3)]
     thermostat_open_degc: Celsius
-    thermostat_span_k: Positive
-    radiator_w_per_k: NonNegative
+    thermostat_span_k: Annotated[float, Field(ge=0.1, le=100.0)]
+    radiator_w_per_k: Annotated[float, Field(ge=0.0, le=20e3)]  # a truck's gives 300 kW at 80 K
     t_amb_degc: Annotated[float, Field(ge=-50.0, le=50.0)]
-    cabin_heat_w: NonNegative
+    cabin_heat_w: Annotated[float, Field(ge=0.0, le=50e3)]  # a coach's
     cabin_heat_from_degc: Celsius
     cabin_heat_full_degc: Celsius
     t_cl_min_degc: Celsius
@@ -129,28 +174,42 @@ class Thermal(Section):
     def _check(self) -> Self:
         if self.t_cl_min_degc >= self.t_cl_max_degc:
             raise ValueError("t_cl_min_degc must be below t_cl_max_degc")
-        if self.cabin_heat_from_degc >= self.cabin_heat_full_degc:
-            raise ValueError("cabin_heat_from_degc must be below cabin_heat_full_degc")
+        if self.cabin_heat_full_degc - self.cabin_heat_from_degc < 0.1:
+            raise ValueError("cabin_heat_from_degc must be below cabin_heat_full_degc, by 0.1 K")
+        if self.t_amb_degc >= self.thermostat_open_degc:
+            raise ValueError("t_amb_degc must be below thermostat_open_degc")
+        opening = (self.thermostat_open_degc + self.thermostat_span_k - self.t_amb_degc) / (
+            self.thermostat_span_k
+        )
+        slope = self.radiator_w_per_k * (1.0 + opening)
+        slope += self.ua0_w_per_k + self.ua1_w_per_k_per_mps * SPEED_MAX_MPS
+        slope += self.cabin_heat_w / (self.cabin_heat_full_degc - self.cabin_heat_from_degc)
+        if slope * STEP_S > self.heat_capacity_j_per_k:
+            raise ValueError(
+                f"heat_capacity_j_per_k must be at least {slope * STEP_S:.3g}: otherwise air, "
+                "radiator and cabin, whose heat rises by that many W per K where the thermostat "
+                f"opens, let the coolant swing within a step of {STEP_S:g} s"
+            )
         return self
 
 
 class Battery(Section):
     """Open-circuit voltage and resistances over SOC, power and SOC limits, auxiliary load."""
 
-    capacity_ah: Positive
-    soc_grid: Grid
-    open_circuit_v: Table
-    resistance_discharge_ohm: Table
-    resistance_charge_ohm: Table
-    power_discharge_max_w: Positive
-    power_charge_max_w: Positive
+    capacity_ah: Annotated[float, Field(ge=0.01, le=10e3)]
+    soc_grid: Charges
+    open_circuit_v: Voltages
+    resistance_discharge_ohm: Resistances
+    resistance_charge_ohm: Resistances
+    power_discharge_max_w: Annotated[float, Field(ge=100.0, le=500e3)]
+    power_charge_max_w: Annotated[float, Field(ge=100.0, le=500e3)]
     soc_min: Share
     soc_max: Share
-    aux_power_w: NonNegative
+    aux_power_w: Annotated[float, Field(ge=0.0, le=50e3)]
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _require_increasing("soc_grid", self.soc_grid)
+        _require_increasing("soc_grid", self.soc_grid, least=1e-6)
         _require_same_length(
             self.soc_grid,
             open_circuit_v=self.open_circuit_v,
@@ -171,6 +230,13 @@ class Battery(Section):
                 f"power_discharge_max_w must be below U_oc^2/(4 R) = {weakest:.0f} W, the most "
                 "the battery can give within soc_min..soc_max"
             )
+        room_j = 3600.0 * self.capacity_ah * float(np.min(voltage)) * (self.soc_max - self.soc_min)
+        largest = max(self.power_discharge_max_w, self.power_charge_max_w)
+        if room_j < largest * STEP_S:
+            raise ValueError(
+                f"capacity_ah holds {room_j:.3g} J within soc_min..soc_max, less than a step of "
+                f"{STEP_S:g} s at power_discharge_max_w or power_charge_max_w, {largest:.3g} W"
+            )
         return self
 
 
@@ -178,15 +244,15 @@ class Trip(Section):
     """Initial state of a run, and the price of a difference in final SOC."""
 
     soc_init: Share
-    t_cl_init_degc: Celsius
-    eta_eq: Share
+    t_cl_init_degc: Annotated[float, Field(ge=-50.0, le=150.0)]  # no colder than the air
+    eta_eq: Annotated[float, Field(ge=0.01, lt=1.0)]
 
 
 class Vehicle(Section):
     """All parameters of the plant."""
 
     name: Name
-    description: str = ""
+    description: Annotated[str, Field(max_length=1000)] = ""
     chassis: Chassis
     engine: Engine
     cold_engine: ColdEngine
@@ -198,8 +264,6 @@ class Vehicle(Section):
     def _check(self) -> Self:
         if not self.battery.soc_min <= self.trip.soc_init <= self.battery.soc_max:
             raise ValueError("trip.soc_init must lie between battery.soc_min and battery.soc_max")
-        if not self.thermal.t_amb_degc < self.thermal.thermostat_open_degc:
-            raise ValueError("thermal.t_amb_degc must be below thermal.thermostat_open_degc")
         return self
 
     def with_settings(self, settings: dict[str, object]) -> "Vehicle":

@@ -143,7 +143,7 @@ class Plant:
         coolant -= boiling
         current = self.battery.current_a(state.soc, p_bat)
         following = PlantState(
-            state.soc - h * current / self.battery.charge_c,
+            min(max(state.soc - h * current / self.battery.charge_c, EMPTY), FULL),
             state.t_cl_degc + coolant / w_per_k,
             on,
         )

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from qpmpc.shown import is_plain, shown
 from qpmpc.vehicle.load import VehicleFile, merged_vehicle, origins, vehicle_files
 from qpmpc.vehicle.parameters import Vehicle
 
@@ -36,11 +37,13 @@ def vehicle_file_text(name_or_path: str | Path) -> str:
     files = vehicle_files(name_or_path)
     vehicle = merged_vehicle(files)
     own = files[0]
-    if len(files) == 1:
+    if len(files) == 1 and _harmless(own.text):
         return own.text if own.text.endswith("\n") else own.text + "\n"
     comments = _merged_comments(files)
-    bases = ", ".join(_printable(file.label) for file in files[1:])
-    remark = f"# Written out in full from {_printable(own.label)}, whose base is {bases}."
+    if bases := ", ".join(shown(file.label) for file in files[1:]):
+        remark = f"# Written out in full from {shown(own.label)}, whose base is {bases}."
+    else:
+        remark = f"# Written out from {shown(own.label)}, whose control characters are escaped."
     head = comments_of(own.text).get("", Comment()).above
     return vehicle_toml(vehicle, {**comments, "": Comment((*head, remark))})
 
@@ -54,7 +57,7 @@ def vehicle_toml(vehicle: Vehicle, comments: Mapping[str, Comment] | None = None
     """
     known = comments or {}
     nothing = Comment()
-    lines = list(known.get("", nothing).above)
+    lines = [_comment_line(text) for text in known.get("", nothing).above]
     for name, value in vehicle.model_dump().items():
         comment = known.get(name, nothing)
         if not isinstance(value, dict):
@@ -115,7 +118,12 @@ def _merged_comments(files: tuple[VehicleFile, ...]) -> dict[str, Comment]:
 
 def _entry(key: str, written: str, comment: Comment) -> list[str]:
     line = f"{key} = {written}" if written else key
-    return [*comment.above, f"{line}  {comment.beside}" if comment.beside else line]
+    beside = f"  {_comment_line(comment.beside)}" if comment.beside else ""
+    return [*map(_comment_line, comment.above), line + beside]
+
+
+def _comment_line(text: str) -> str:
+    return shown(text.expandtabs())
 
 
 def _array(key: str, values: tuple[float, ...]) -> str:
@@ -127,9 +135,13 @@ def _array(key: str, values: tuple[float, ...]) -> str:
 
 
 def _string(text: str) -> str:
-    # JSON escapes what TOML does, except for the one control character above the others.
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+    # JSON escapes what TOML must; TOML has a longer escape, where JSON has two short ones
+    return "".join(
+        c if is_plain(c) else f"\\u{ord(c):04x}" if ord(c) <= 0xFFFF else f"\\U{ord(c):08x}"
+        for c in json.dumps(text, ensure_ascii=False)
+    )
 
 
-def _printable(label: str) -> str:
-    return "".join(c if c.isprintable() else "?" for c in label)
+def _harmless(text: str) -> bool:
+    """Whether it holds no control characters but line ends and tabs."""
+    return is_plain(text.replace("\n", "").replace("\t", ""))

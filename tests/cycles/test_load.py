@@ -1,14 +1,17 @@
 """Names, files, and what is wrong with users' files."""
 
+import os
 import re
 from collections.abc import Callable
 from pathlib import Path
+from threading import Thread
 
 import numpy as np
 import pytest
 
 from qpmpc.cycles import Cycle, cycle_names, load_cycle
-from qpmpc.cycles.plausibility import GAP_MAX_S
+from qpmpc.cycles.plausibility import GAP_MAX_S, GAP_STANDING_MAX_S
+from qpmpc.cycles.read_csv import MEGABYTES_MAX
 from qpmpc.errors import InputError
 
 Write = Callable[[str | bytes], Path]
@@ -45,10 +48,44 @@ def test_unknown_name_lists_the_names() -> None:
         load_cycle("nyc")
 
 
-@pytest.mark.parametrize("name", ["a" * 5000, "a\0b"])
+@pytest.mark.parametrize("name", ["a" * 50_000, "a\0b", "caf\udce9"])
 def test_impossible_name(name: str) -> None:
-    with pytest.raises(InputError, match="unknown cycle"):
+    with pytest.raises(InputError, match="unknown cycle") as caught:
         load_cycle(name)
+    assert len(str(caught.value)) < 300
+
+
+@pytest.mark.parametrize(
+    ("path", "reason"),
+    [
+        ("a" * 300 + ".csv", "too long: at most 255 bytes a name"),
+        ("x/" * 3000 + "a.csv", "too long: .* 4095 in all"),
+        ("a\0b.csv", "null"),
+        ("caf\udce9.csv", "not UTF-8: rename it"),
+    ],
+)
+def test_impossible_path(path: str, reason: str) -> None:
+    with pytest.raises(InputError, match=reason) as caught:
+        load_cycle(path)
+    assert len(str(caught.value)) < 300
+    assert str(caught.value).isprintable()
+
+
+def test_a_file_too_large_is_refused_before_it_is_read_as_a_table(tmp_path: Path) -> None:
+    path = tmp_path / "trip.csv"
+    with path.open("wb") as file:
+        file.truncate(MEGABYTES_MAX * 1_000_000 + 1)
+    refused(path, f"larger than {MEGABYTES_MAX} MB")
+
+
+def test_a_trip_through_a_pipe(tmp_path: Path) -> None:
+    """As of a shell's <(command)."""
+    pipe = tmp_path / "trip.csv"
+    os.mkfifo(pipe)
+    writer = Thread(target=pipe.write_text, args=[GOOD])
+    writer.start()
+    np.testing.assert_array_equal(load_cycle(pipe).speed_mps, [0, 1, 2, 3, 3])
+    writer.join()
 
 
 def test_name_of_a_file_is_its_stem(write: Write) -> None:
@@ -160,7 +197,7 @@ def test_empty_file(write: Write, text: bytes) -> None:
 
 @pytest.mark.parametrize("content", [bytes(range(256)), GOOD.encode("utf-16"), b"a,b\0c\n1,2\n"])
 def test_binary_file(write: Write, content: bytes) -> None:
-    refused(write(content), "not a CSV file: it must be plain text in UTF-8")
+    refused(write(content), "must be plain text in UTF-8")
 
 
 def test_missing_file_and_directory(tmp_path: Path) -> None:
@@ -168,12 +205,32 @@ def test_missing_file_and_directory(tmp_path: Path) -> None:
     refused(tmp_path, "is a directory")
 
 
-def test_gap_at_constant_speed_is_filled(write: Write) -> None:
-    """A logger that sleeps while the car stands."""
-    gap_s = 20 * GAP_MAX_S
-    cycle = load_cycle(write(HEADER + f"0,4\n2,0\n{gap_s},0\n{gap_s + 2},4\n"))
-    assert cycle.duration_s == gap_s + 2
+def test_gap_while_the_car_stands_is_filled(write: Write) -> None:
+    """A logger that sleeps at a red light, up to the longest one."""
+    gap_s = GAP_STANDING_MAX_S
+    cycle = load_cycle(write(HEADER + f"0,4\n2,0\n{2 + gap_s},0\n{4 + gap_s},4\n"))
+    assert cycle.duration_s == gap_s + 4
     assert cycle.distance_m == 8
+
+
+@pytest.mark.parametrize(
+    ("rows", "gap"),
+    [
+        # an hour at cruise: 90 km would be invented
+        ("0,25\n1,25\n3601,25\n3602,25\n", "line 4: 3600 s"),
+        ("0,0\n1,1\n13,1\n14,1\n", "line 4: 12 s"),
+        ("0,0\n1,0\n13,9\n14,9\n", "line 4: 12 s"),
+        # parked overnight: engine and cabin would be kept warm
+        ("0,5\n5,0\n6,0\n30006,0\n30010,5\n", "line 5: 30000 s"),
+        ("0,5\n5,0\n306,0\n307,0\n", "line 4: 301 s"),
+    ],
+)
+def test_longer_gaps_are_refused_with_the_way_out(write: Write, rows: str, gap: str) -> None:
+    refused(
+        write(HEADER + rows),
+        f"{gap} without a sample, at most {GAP_MAX_S:g} s are allowed, {GAP_STANDING_MAX_S:g} s "
+        "standing: .*if these are two trips, make a file of each",
+    )
 
 
 @pytest.mark.parametrize("name", cycle_names())
@@ -200,11 +257,14 @@ def test_aggressive_driving_passes(write: Write, name: str, factor: float) -> No
     assert load_cycle(write(as_csv(load_cycle(name), factor))).steps == load_cycle(name).steps
 
 
-def test_short_sprint_passes(write: Write) -> None:
+def test_short_sprint_passes_with_a_remark(write: Write) -> None:
     """A sports car: 0 to 50 m/s (180 km/h) at 5 m/s^2, up to 250 W/kg."""
     speed = np.concatenate([np.linspace(0, 50, 11), np.linspace(50, 0, 11)])
     rows = "".join(f"{k},{v}\n" for k, v in enumerate(speed))
-    assert load_cycle(write(HEADER + rows)).distance_m > 500
+    cycle = load_cycle(write(HEADER + rows))
+    assert cycle.distance_m > 500
+    (remark,) = cycle.remarks
+    assert "226 W/kg accelerating (above 28), 5 m/s^2 (above 3.5), 5 m/s^3 (above 4)" in remark
 
 
 def test_steady_motorway_in_mph_is_noticed(write: Write) -> None:

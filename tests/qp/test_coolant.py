@@ -81,3 +81,19 @@ def test_chord_of_the_radiator_is_near_the_plant_and_above():
     for t in np.linspace(THERMAL.thermostat_open_degc, THERMAL.t_cl_max_degc, 21):
         above = slope * (t - THERMAL.thermostat_open_degc) - radiator_w(THERMAL, float(t))
         assert -1e-6 <= above <= THERMAL.radiator_w_per_k * span / 4.0 + 1e-6
+
+
+@pytest.mark.parametrize("real", [np.float64, np.float32])
+@pytest.mark.parametrize("heat_w", [-20e3, -300.0, 0.0, 300.0, 20e3])
+@pytest.mark.parametrize("start_k", [-40.0, -0.1, 0.0, 0.1, 5.0])
+def test_without_a_radiator_the_coolant_is_a_plain_store(real, heat_w, start_k):
+    """Also in the arithmetic of small processors, where small differences of large numbers end."""
+    without = THERMAL.model_copy(update={"radiator_w_per_k": 0.0})
+    capacity, duration_s = without.heat_capacity_j_per_k, 120.0
+    inputs = (np.array([value], dtype=real) for value in (duration_s, start_k, heat_w))
+    end_k, per_heat, per_start = thermostat_step(without, *inputs)
+    assert end_k.dtype == real
+    tolerance = 1e-5 if real is np.float64 else 1e-4
+    assert end_k[0] == pytest.approx(start_k + heat_w * duration_s / capacity, abs=40 * tolerance)
+    assert per_heat[0] == pytest.approx(duration_s / capacity, rel=tolerance)
+    assert per_start[0] == pytest.approx(1.0, rel=tolerance)

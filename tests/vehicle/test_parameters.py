@@ -61,7 +61,7 @@ def test_bad_values_are_named_in_one_line(tmp_path, old, new, named):
 def test_missing_files_and_unknown_names_say_what_is_allowed(tmp_path):
     with pytest.raises(InputError, match="prius-nimh"):
         load_vehicle("prius")
-    with pytest.raises(InputError, match="No such file"):
+    with pytest.raises(InputError, match="no such file"):
         load_vehicle(tmp_path / "none.toml")
 
 
@@ -111,7 +111,7 @@ def test_only_finite_numbers_are_entries(section, key):
     for wrong in NOT_NUMBERS:
         with pytest.raises(InputError, match=rf"{section}.{key}\[1\]: must be"):
             load_vehicle().with_settings({f"{section}.{key}": [values[0], wrong, *values[2:]]})
-    for wrong in (True, 1.0, "1, 2", [1.0]):
+    for wrong in (True, 1.0, "1, 2", values[:1], values * 500):
         with pytest.raises(InputError, match=f"{section}.{key}: must"):
             load_vehicle().with_settings({f"{section}.{key}": wrong})
 

@@ -9,17 +9,18 @@ from hypothesis import strategies as st
 
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.vehicle import Command, Plant, PlantState, demand_w, load_vehicle
+from qpmpc.vehicle.plant import BOILING_DEGC
 
 PLANT = Plant(load_vehicle())
 BALANCE = 1e-9  # relative to the power turned over in the step, as promised in the docs
 
 
 @given(
-    soc=st.floats(0.4, 0.8),
-    t_cl_degc=st.floats(-7.0, 95.0),
+    soc=st.floats(0.0, 1.0),
+    t_cl_degc=st.floats(-20.0, 135.0),
     on=st.booleans(),
     p_eng_w=st.floats(0.0, 71e3),
-    demand=st.floats(-40e3, 60e3),
+    demand=st.floats(-150e3, 200e3),
     speed_mps=st.floats(0.0, 40.0),
 )
 def test_energy_is_conserved_in_every_step(soc, t_cl_degc, on, p_eng_w, demand, speed_mps):
@@ -28,16 +29,40 @@ def test_energy_is_conserved_in_every_step(soc, t_cl_degc, on, p_eng_w, demand, 
     battery, thermal = PLANT.vehicle.battery, PLANT.vehicle.thermal
     current = f.internal_w / PLANT.battery.open_circuit.at(soc)
     resistance = (PLANT.battery.discharge if f.p_bat_w >= 0 else PLANT.battery.charge).at(soc)
-    saturated = PLANT.battery.open_circuit.at(soc) ** 2 < 4 * resistance * f.p_bat_w
-    joule_w = f.internal_w - f.p_bat_w if saturated else resistance * current**2
+    joule_w = resistance * current**2
     stored_w = thermal.heat_capacity_j_per_k * (after.t_cl_degc - t_cl_degc)
     chemical_w = f.fuel_w + f.internal_w
-    work_w = demand + battery.aux_power_w + f.p_friction_w
-    heat_w = joule_w + f.exhaust_w + f.air_w + f.radiator_w + f.cabin_w + stored_w
+    work_w = demand + battery.aux_power_w + f.p_friction_w - f.p_missing_w
+    lost_w = f.exhaust_w + f.air_w + f.radiator_w + f.cabin_w + f.boiling_w
+    heat_w = joule_w + lost_w + stored_w
     turnover = abs(f.fuel_w) + abs(f.internal_w) + abs(demand) + 1e3
     assert chemical_w == pytest.approx(work_w + heat_w, abs=BALANCE * turnover + 1e-6)
     drawn_w = (soc - after.soc) * PLANT.battery.charge_c * PLANT.battery.open_circuit.at(soc)
     assert drawn_w == pytest.approx(f.internal_w, abs=BALANCE * turnover + 1e-5)
+
+
+@given(
+    soc=st.floats(0.0, 1.0),
+    t_cl_degc=st.floats(-20.0, 130.0),
+    command=st.builds(Command, st.booleans(), st.floats(-1e6, 1e6)),
+    demand=st.floats(-1e6, 1e6),
+    speed_mps=st.floats(0.0, 60.0),
+)
+def test_states_stay_physical_whatever_is_asked(soc, t_cl_degc, command, demand, speed_mps):
+    after, f = PLANT.step(PlantState(soc, t_cl_degc), command, demand, speed_mps)
+    assert 0.0 <= after.soc <= 1.0
+    coldest = min(t_cl_degc, PLANT.vehicle.thermal.t_amb_degc)
+    assert coldest - 1e-9 <= after.t_cl_degc <= BOILING_DEGC + 1e-9
+    assert min(f.cabin_w, f.boiling_w) >= 0.0
+    within = -25e3 - 1e-6 <= f.p_bat_w <= 27e3 + 1e-6
+    assert within or f.power_excess_w > 0.0
+
+
+def test_a_battery_gives_no_more_than_it_holds():
+    after, f = PLANT.step(PlantState(1e-4, 50.0), Command(False, 0.0), 20e3, 20.0)
+    assert after.soc == pytest.approx(0.0, abs=1e-15)
+    assert f.p_missing_w == pytest.approx(20.4e3 - f.p_bat_w)
+    assert f.p_missing_w > 19e3
 
 
 def test_discharge_lowers_soc_and_the_engine_burns_only_when_on():

@@ -8,6 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from strategies import differences
 
+from qpmpc.shown import shown
 from qpmpc.vehicle import load_vehicle, vehicle_file_text, vehicle_names, vehicle_toml
 from qpmpc.vehicle.toml_text import comments_of
 
@@ -121,7 +122,8 @@ def test_any_comment_and_any_text_leave_a_file_that_loads_back(tmp_path, comment
     )
     copy.write_text(vehicle_file_text(str(path)), "utf-8")
     assert load_vehicle(copy) == load_vehicle(path)
-    assert comments_of(copy.read_text("utf-8"))["trip.soc_init"].beside == f"#{comment}".rstrip()
+    written = shown(f"#{comment}".rstrip())
+    assert comments_of(copy.read_text("utf-8"))["trip.soc_init"].beside == written
 
 
 def test_a_path_that_is_no_comment(tmp_path):

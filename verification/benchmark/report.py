@@ -1,12 +1,10 @@
 """Files of a benchmark: JSON, pictures, one self-contained HTML page."""
 
 from base64 import b64encode
-from importlib.resources import files
 from pathlib import Path
 
-from jinja2 import Environment, StrictUndefined
-
 from qpmpc.files import json_text, write_bytes, write_text
+from qpmpc.report.html import html_page
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.verification.benchmark.benchmark import Benchmark
 from qpmpc.verification.benchmark.candidates import RIVAL_TOLERANCE
@@ -28,10 +26,10 @@ def write_benchmark(result: Benchmark, vehicle: Vehicle, folder: Path) -> None:
         write_bytes(folder / f"{name}.png", picture)
     data = result.as_data()
     write_text(folder / "benchmark.json", json_text(data))
-    template = files("qpmpc.verification.benchmark").joinpath("benchmark.html.j2")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     cycles = dict.fromkeys(row["cycle"] for row in result.rows)
-    page = environment.from_string(template.read_text("utf-8")).render(
+    page = html_page(
+        "qpmpc.verification.benchmark",
+        "benchmark.html.j2",
         vehicle=vehicle,
         tolerance=f"{RIVAL_TOLERANCE:g}",
         cycles={c: [row for row in result.rows if row["cycle"] == c] for c in cycles},

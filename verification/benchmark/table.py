@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from typing import Any
 
-from rich.table import Table
+from qpmpc.report.table import ShownTable
 
 
-def benchmark_table(rows: Sequence[dict[str, Any]]) -> Table:
+def benchmark_table(rows: Sequence[dict[str, Any]]) -> ShownTable:
     """Return one line per candidate and cycle; times in ms."""
-    table = Table(title="Accuracy against speed (times in ms; max: median over repetitions)")
+    table = ShownTable(title="Accuracy against speed (times in ms; max: median over repetitions)")
     table.add_column("cycle")
     table.add_column("candidate")
     for name in ("above DP %", "step median", "p99", "max", "solve median", "max", "cycle s"):

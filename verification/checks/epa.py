@@ -9,11 +9,11 @@ import sys
 from dataclasses import dataclass
 
 from rich.console import Console
-from rich.table import Table
 
 from qpmpc.closed_loop import drive
 from qpmpc.controllers.balance import rule_based
 from qpmpc.controllers.settings import ControllerSettings
+from qpmpc.report.table import ShownTable
 from qpmpc.trip import Trip
 from qpmpc.vehicle import load_vehicle
 
@@ -85,7 +85,7 @@ def model_mpg(case: EpaCase) -> float:
 
 def main() -> int:
     """Print the table; the exit code is 1 if a figure is off its reference by more than 3 %."""
-    table = Table(title="Rule-based, unadjusted mpg")
+    table = ShownTable(title="Rule-based, unadjusted mpg")
     for column in ("case", "EPA", "this model", "reference", "off reference", "off EPA"):
         table.add_column(column, justify="left" if column == "case" else "right")
     worst = 0.0

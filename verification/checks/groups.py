@@ -15,6 +15,7 @@ from qpmpc.verification.checks import (
     relaxation_checks,
     relaxed_trip_checks,
     rendering_checks,
+    safety_checks,
 )
 from qpmpc.verification.checks.check import Check
 from qpmpc.verification.checks.context import Context
@@ -72,6 +73,7 @@ PHYSICS = Group(
         physics_checks.dimensions,
     ),
 )
+SAFETY = Group("Safety of the next second", (safety_checks.no_command_is_safer,))
 EPA = Group("EPA's dynamometer", (epa_checks.epa_figures,))
 BOUNDS = Group(
     "Least fuel of a trip",

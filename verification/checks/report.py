@@ -1,11 +1,9 @@
 """The HTML report of a verification: one self-contained file."""
 
 from dataclasses import dataclass, field
-from importlib.resources import files
 from typing import Any
 
-from jinja2 import Environment, StrictUndefined
-
+from qpmpc.report.html import html_page
 from qpmpc.report.provenance import provenance
 from qpmpc.verification.checks.check import Check
 
@@ -56,7 +54,10 @@ def figure(value: float) -> str:
 
 def verification_html(results: Results) -> str:
     """Return the report."""
-    template = files("qpmpc.verification.checks").joinpath("verify.html.j2").read_text("utf-8")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    environment.filters["figure"] = figure
-    return environment.from_string(template).render(results=results, provenance=provenance())
+    return html_page(
+        "qpmpc.verification.checks",
+        "verify.html.j2",
+        results=results,
+        figure=figure,
+        provenance=provenance(),
+    )

@@ -1,10 +1,13 @@
 """How finely dynamic programming resolves state and input."""
 
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-Step = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+CELLS_MAX = 4e6
+"""Of one grid: some gigabytes, as its values at some tens of seconds are kept."""
+
+T_CL_RANGE_K = 100.0
 
 
 class DpSettings(BaseModel):
@@ -25,13 +28,23 @@ class DpSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    soc_step: Annotated[Step, Field(le=0.1)] = 0.002
-    t_cl_step_k: Annotated[Step, Field(le=10.0)] = 0.5
-    power_step_w: Annotated[Step, Field(le=10000.0)] = 500.0
+    soc_step: Annotated[float, Field(ge=1e-4, le=0.1)] = 0.002
+    t_cl_step_k: Annotated[float, Field(ge=0.01, le=10.0)] = 0.5
+    power_step_w: Annotated[float, Field(ge=10.0, le=10e3)] = 500.0
     refinement: Annotated[int, Field(ge=1, le=256)] = 8
-    tube_soc: Annotated[Step, Field(le=1.0)] = 0.04
-    tube_t_cl_k: Annotated[Step, Field(le=100.0)] = 5.0
-    threads: Annotated[int, Field(ge=1)] | None = None
+    tube_soc: Annotated[float, Field(ge=1e-3, le=1.0)] = 0.04
+    tube_t_cl_k: Annotated[float, Field(ge=0.1, le=100.0)] = 5.0
+    threads: Annotated[int, Field(ge=1, le=1024)] | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        box = T_CL_RANGE_K / (self.soc_step * self.t_cl_step_k)
+        cell = self.soc_step * self.t_cl_step_k / self.refinement**2
+        tube = 4.0 * self.tube_soc * self.tube_t_cl_k / cell
+        for cells, keys in ((box, "soc_step, t_cl_step_k"), (tube, "tube_soc, tube_t_cl_k")):
+            if cells > CELLS_MAX:
+                raise ValueError(f"{keys} make {cells:.2g} cells, at most {CELLS_MAX:.2g}")
+        return self
 
     @classmethod
     def quick(cls) -> "DpSettings":

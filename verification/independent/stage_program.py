@@ -167,6 +167,23 @@ class Curves:
     alpha: PwaFit
 
 
+def _heat_reserve_k(equations: Equations) -> float:
+    """What the coolant loses in five minutes at 8 m/s with an engine that feeds only auxiliaries.
+
+    No more than half of the way from one limit to the other.
+    """
+    car = equations.vehicle
+    th, least = car.thermal, car.thermal.t_cl_min_degc
+    shaft_w = max(car.battery.aux_power_w, car.engine.power_min_w)
+    burnt_w = float(equations.alpha(least) * equations.fuel_g_per_s(shaft_w)[0])
+    burnt_w *= equations.lhv_j_per_g
+    warming_w = (1.0 - th.exhaust_share) * (burnt_w - shaft_w)
+    to_air_w = float(equations.ua_w_per_k(8.0)) * (least - th.t_amb_degc)
+    taken_w = to_air_w + float(equations.cabin_w(least) + equations.radiator_w(least))
+    lost_k = 300.0 * (taken_w - warming_w) / th.heat_capacity_j_per_k
+    return min(max(lost_k, 0.0), (th.t_cl_max_degc - least) / 2.0)
+
+
 def stage_program(
     vehicle: Vehicle,
     curves: Curves,
@@ -256,7 +273,7 @@ def stage_program(
             high = min(qp.terminal_high * vehicle.trip.soc_init, high)
         rows.add("SOC max", high, {at[SOC]: 1.0})
         rows.add("SOC min", -min(low, reach - 1e-5), {at[SOC]: -1.0})
-        coldest = th.t_cl_min_degc + qp.t_cl_margin_k
+        coldest = th.t_cl_min_degc + qp.t_cl_margin_k + _heat_reserve_k(equations)
         rows.add("coolant min", -coldest, {at[T_CL]: -1.0, at[T_SLACK]: -1.0})
         rows.add("coolant max", th.t_cl_max_degc - 0.05, {at[T_CL]: 1.0, at[T_SLACK]: -1.0})
         rows.add("slack", 0.0, {at[T_SLACK]: -1.0})

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.preview.stages import Stages
+from qpmpc.qp.heat_reserve import heat_reserve_k
 from qpmpc.qp.rows import ACCURATE_STAGE_S, SIGMA_FORCED, Var
 from qpmpc.qp.stage_qp import T_CL_MAX_MARGIN_K, QpSettings
 from qpmpc.vehicle.battery import BatteryMaps
@@ -175,7 +176,7 @@ class NlpProblem:
         thermal, settings = self.vehicle.thermal, self.settings
         lower, upper = np.full((self.stages, 6), -np.inf), np.full((self.stages, 6), np.inf)
         lower[:, [0, 1, 5]], upper[:, 1] = 0.0, 0.0
-        lower[:, 3] = thermal.t_cl_min_degc + settings.t_cl_margin_k
+        lower[:, 3] = thermal.t_cl_min_degc + settings.t_cl_margin_k + heat_reserve_k(self.vehicle)
         upper[:, 4] = thermal.t_cl_max_degc - T_CL_MAX_MARGIN_K
         return lower, upper
 

@@ -3,13 +3,11 @@
 import json
 from base64 import b64encode
 from collections.abc import Callable
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, StrictUndefined
-
 from qpmpc.files import json_text, write_text
+from qpmpc.report.html import html_page, preformatted
 from qpmpc.report.provenance import provenance
 from qpmpc.report.units import unit_of
 from qpmpc.verification.reproduction.checks import checks_of
@@ -78,10 +76,10 @@ def write_report(study: Study, folder: Path) -> Path:
     for table in tables.values():
         table.write(folder)
     write_text(folder / DATA, json_text(study_data(study)))
-    template = files("qpmpc.verification.reproduction").joinpath("reproduction.html.j2")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     vehicle = study.vehicle
-    page = environment.from_string(template.read_text("utf-8")).render(
+    page = html_page(
+        "qpmpc.verification.reproduction",
+        "reproduction.html.j2",
         study=study,
         vehicle=vehicle,
         findings=findings(study, checks_of(study)),
@@ -92,7 +90,7 @@ def write_report(study: Study, folder: Path) -> Path:
             for section, values in vehicle.model_dump(exclude={"name", "description"}).items()
             for key, value in values.items()
         ],
-        settings=json.dumps(study.settings.model_dump(), indent=2),
+        settings=preformatted(json.dumps(study.settings.model_dump(), indent=2)),
         provenance=provenance(),
     )
     write_text(folder / PAGE, page)

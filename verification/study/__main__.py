@@ -11,6 +11,7 @@ from rich.progress import Progress
 from qpmpc.cycles import load_cycle
 from qpmpc.files import check_folder, json_text, write_bytes, write_text
 from qpmpc.report.provenance import provenance
+from qpmpc.shown import shown
 from qpmpc.vehicle import load_vehicle, vehicle_names
 from qpmpc.verification.study.picture import draw_study
 from qpmpc.verification.study.study import places, study
@@ -45,7 +46,8 @@ def main(arguments: list[str] | None = None) -> int:
     write_text(given.out / "study.json", json_text(data))
     write_text(given.out / "study.md", markdown(rows))
     write_bytes(given.out / "study.png", draw_study(rows))
-    Console().print(f"{given.out / 'study.md'} written, with study.json and study.png")
+    written = f"{given.out / 'study.md'} written, with study.json and study.png"
+    Console().print(shown(written), markup=False)
     return 0
 
 

@@ -1,0 +1,214 @@
+"""Compiled libraries kept on disk, in a folder that nobody else can write to.
+
+A library's name holds the key of what it was made from and the SHA-256 of its content. It is loaded
+only if that is still its content. Between this check and the loading nobody can change it, because
+the folder is private: that is checked before each use, up to the root of the file system. Where no
+such folder can be had, a temporary one of this process takes its place.
+"""
+
+import atexit
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from fcntl import LOCK_EX, LOCK_SH, flock
+from functools import cache
+from grp import getgrgid
+from hashlib import sha256
+from pathlib import Path
+from pwd import getpwuid
+from stat import S_IMODE, S_ISDIR, S_ISREG, S_ISVTX, S_IWGRP, S_IWOTH
+from typing import NamedTuple
+
+from qpmpc.files import replace_file
+
+MOST_BYTES = 64 * 2**20  # of all libraries together; one has about a quarter of a MiB
+IN_USE_S = 60.0  # a library used in this time may be about to be loaded: it is not deleted
+_OTHERS_WRITE = S_IWGRP | S_IWOTH
+
+
+class Kept(NamedTuple):
+    """A library that may be loaded.
+
+    Attributes
+    ----------
+    file : of the library
+    remark : the folder in which it cannot be kept and why, in one line; empty if it is kept
+    """
+
+    file: Path
+    remark: str = ""
+
+
+def kept_library(key: str, build: Callable[[], bytes]) -> Kept:
+    """Return the library of a key, built if it is not there or is not what was stored.
+
+    Parameters
+    ----------
+    key : hash of all that the library is made from
+    build : makes its content
+
+    Raises
+    ------
+    OSError
+        If there is not even a temporary folder.
+    """
+    content = b""
+    folder = _folder()
+    try:
+        fault = _fault(folder)
+        if not fault:
+            if found := _whole(folder, key):
+                return Kept(found)
+            content = build()
+            return Kept(_stored(folder, key, content))
+    except OSError as error:
+        fault = str(error.strerror)
+    private = _private_folder(os.getpid())
+    file = _whole(private, key) or _stored(private, key, content or build())
+    return Kept(file, f"compiled controllers are not kept for the next run: {folder}: {fault}")
+
+
+def _folder() -> Path:
+    """Return the folder that the environment names, its parents free of links."""
+    chosen = os.environ.get("QPMPC_CACHE_DIR")
+    if chosen:
+        folder = Path(chosen).absolute() / "compiled"
+    else:
+        base = os.environ.get("XDG_CACHE_HOME", "")
+        if not base.startswith("/"):  # as XDG's specification has it
+            base = os.path.expanduser("~/.cache")  # noqa: PTH111 - does not raise
+        folder = Path(base) / "qpmpc-iptm"
+    return Path(os.path.realpath(folder.parent)) / folder.name if folder.is_absolute() else folder
+
+
+def _fault(folder: Path) -> str:
+    """Make the folder if it is not there; return why it cannot be used, empty if it can.
+
+    Raises
+    ------
+    OSError
+        If it cannot be made or examined.
+    """
+    if not folder.is_absolute():
+        return "there is no home folder (QPMPC_CACHE_DIR names another)"
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with suppress(FileExistsError):
+        folder.mkdir(mode=0o700)
+    found, own = folder.lstat(), os.geteuid()
+    if not S_ISDIR(found.st_mode):
+        return "is a link or a file, not a folder"
+    if found.st_uid != own:
+        return f"belongs to {_user(found.st_uid)}"
+    if found.st_mode & _OTHERS_WRITE:
+        return f"others may write to it (mode {S_IMODE(found.st_mode):o}; chmod 700 mends it)"
+    for parent in folder.parents:
+        above = parent.stat()
+        if above.st_uid not in (0, own):
+            return f"{parent} belongs to {_user(above.st_uid)}"
+        # in a folder that is sticky, as /tmp is, nobody else can rename what is ours
+        sticky = above.st_mode & S_ISVTX
+        if above.st_mode & _OTHERS_WRITE and not sticky and not _for_us_alone(above):
+            return f"others may write to {parent}"
+    if os.statvfs(folder).f_flag & getattr(os, "ST_NOEXEC", 0):
+        return "is on a file system mounted noexec"
+    return ""
+
+
+def _user(number: int) -> str:
+    with suppress(KeyError):
+        return f"user {getpwuid(number).pw_name}"
+    return f"user {number}"
+
+
+def _for_us_alone(folder: os.stat_result) -> bool:
+    """Whether those who may write are the user's private group, usual with a umask of 002."""
+    with suppress(KeyError):
+        own = getpwuid(os.geteuid()).pw_name
+        group = getgrgid(folder.st_gid)
+        alone = group.gr_name == own and set(group.gr_mem) <= {own}
+        return alone and not folder.st_mode & S_IWOTH
+    return False
+
+
+@cache
+def _private_folder(process: int) -> Path:
+    """Make a folder that goes when this process ends."""
+    folder = Path(tempfile.mkdtemp(prefix="qpmpc-"))
+
+    def remove() -> None:
+        if os.getpid() == process:  # a fork ends as well, and this is not its own
+            shutil.rmtree(folder, ignore_errors=True)
+
+    atexit.register(remove)
+    return folder
+
+
+def _whole(folder: Path, key: str) -> Path | None:
+    """Return the library if it is as it was stored; whatever else has its name is removed."""
+    with _locked(folder, LOCK_SH):
+        for file in folder.glob(f"{key}-*.so"):
+            with suppress(OSError):
+                content = _content(file)
+                if content and file.name == _name(key, content):
+                    os.utime(file)  # the last to be deleted
+                    return file
+                file.unlink()
+    return None
+
+
+def _content(file: Path) -> bytes:
+    """Return the content of a file of ours, and of nobody else; empty for anything else."""
+    try:
+        handle = os.open(file, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+    except OSError:
+        return b""
+    with open(handle, "rb") as stream:  # noqa: PTH123
+        found = os.fstat(handle)
+        ours = S_ISREG(found.st_mode) and found.st_uid == os.geteuid() and found.st_nlink == 1
+        return stream.read() if ours and not found.st_mode & _OTHERS_WRITE else b""
+
+
+def _name(key: str, content: bytes) -> str:
+    return f"{key}-{sha256(content).hexdigest()}.so"
+
+
+def _stored(folder: Path, key: str, content: bytes) -> Path:
+    file = folder / _name(key, content)
+    replace_file(file, content, mode=0o600, durable=True)
+    _bound(folder, file)
+    return file
+
+
+def _bound(folder: Path, newest: Path) -> None:
+    """Delete the libraries, and what broken writes left, that were not used for longest."""
+    with _locked(folder, LOCK_EX):
+        total, now = 0, time.time()
+        for used_s, size, file in sorted(_files(folder), reverse=True):
+            total += size
+            if total > MOST_BYTES and file != newest and now - used_s > IN_USE_S:
+                with suppress(OSError):
+                    file.unlink()
+
+
+def _files(folder: Path) -> Iterator[tuple[float, int, Path]]:
+    """Time of the last use, size and name."""
+    for pattern in ("*.so", ".*.tmp"):
+        for file in folder.glob(pattern):
+            with suppress(FileNotFoundError):  # a temporary one, renamed meanwhile
+                found = file.lstat()
+                yield found.st_mtime, found.st_size, file
+
+
+@contextmanager
+def _locked(folder: Path, how: int) -> Iterator[None]:
+    """Let nothing be deleted between the check of a library and the note that it is in use."""
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        with suppress(OSError):  # some network file systems lock no folders
+            flock(handle, how)
+        yield
+    finally:
+        os.close(handle)
