@@ -62,6 +62,7 @@ def test_rungs_flags_and_fuel(unfaulted):
     assert found["fuel_percent"] == pytest.approx(percent)
     assert found["violations"] == {"soc": 0.0, "t_cl_degc": 0.0, "power_w": 0.0}
     faulted.trajectory.power_excess_w = faulted.trajectory.power_excess_w + 70.0
+    faulted = replace(faulted)  # without what the run has remembered of its limits
     assert effect(FAULT, faulted, unfaulted)["violations"]["power_w"] == 70.0
 
 
