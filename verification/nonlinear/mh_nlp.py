@@ -55,7 +55,8 @@ class MhNlp(Planner):
         return Plan(on_share, powers_w, True, solved.iterations)
 
     def forget(self) -> None:
-        """Forget the last solution, as after a restart of the controller under way."""
+        """Forget preview and last solution, as after a restart of the controller under way."""
+        self.preview.forget()
         self._last = None
 
     def solve(self, seen: Observation) -> NlpPlan:
