@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from qpmpc.codegen.generate import Precision
 from qpmpc.codegen.host_library import build_host_library
 from qpmpc.codegen.values import values_of
-from qpmpc.controllers.base import Controller, Decision, Progress
+from qpmpc.controllers.base import Controller, Decision, Progress, Receive
 from qpmpc.controllers.monitor import Flag
 from qpmpc.controllers.settings import ControllerSettings, MhQpSettings
-from qpmpc.preview.stages import Preview
 from qpmpc.qp.rows import VARS
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.plant import Command
@@ -31,7 +30,7 @@ class InputBuilder:
     receive : returns the preview of a second; the C code checks it
     """
 
-    def __init__(self, receive: Callable[[int], Preview]) -> None:
+    def __init__(self, receive: Receive) -> None:
         self.receive = receive
 
     def fill(self, seen: Observation, into: Any) -> None:
@@ -90,10 +89,11 @@ class GeneratedController(Controller):
         blocks = self.of_qp.horizon.block_count(trip.forecast.steps)
         rules, section = self.settings.rule_based, name.replace("-", "_")
         values = values_of(trip.vehicle, self.of_qp, rules, blocks, section)
-        self.library = build_host_library(values, precision)
+        self.library = self._normal = build_host_library(values, precision)
         self.remarks += filter(None, [self.library.remark])
         self.fill_s = self.call_s = 0.0
-        self.inputs = InputBuilder(trip.preview(self.of_qp.horizon).receive)
+        self._receive = trip.preview(self.of_qp.horizon).receive
+        self.inputs = InputBuilder(self._receive)
         self._state = ctypes.create_string_buffer(self.library.state_bytes)
         self._in, self._out = self.library.input_type(), self.library.output_type()
         self._arguments = (self._state, ctypes.byref(self._in), ctypes.byref(self._out))
@@ -111,9 +111,25 @@ class GeneratedController(Controller):
         start = perf_counter()
         self.inputs.fill(seen, self._in)
         filled = perf_counter()
+        if self.library.solver_may_succeed is not None:
+            self.library.solver_may_succeed.value = not self.solver_fails
         self.library.step(*self._arguments)
         self.fill_s, self.call_s = filled - start, perf_counter() - filled
         return decision_of(self._out)
+
+    def inject(
+        self, hearing: Callable[[Receive], Receive] | None, solver: bool = False
+    ) -> frozenset[str]:
+        """Prepare for faults, that of the solver in a library of its own.
+
+        See `Controller.inject`.
+        """
+        normal = self._normal
+        self.library = (
+            build_host_library(normal.values, normal.precision, may_fail=True) if solver else normal
+        )
+        self.inputs.receive = self._receive if hearing is None else hearing(self._receive)
+        return frozenset({"preview", "solver"})
 
     def forget(self) -> None:
         """Forget plan, warm start and the rules' memory, as after a restart of the ECU."""

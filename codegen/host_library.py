@@ -43,6 +43,11 @@ FLAGS = (
 )
 NEEDS_NONE = "mh_qp.implementation=python needs none"
 _STATE = 4
+# Before mpc_step.c in a library whose solver fails where it is told to.
+MAY_FAIL = """#include <stdint.h>
+int32_t mpc_solver_may_succeed = 1;
+#define MPC_SOLVER_MAY_SUCCEED mpc_solver_may_succeed
+"""
 
 
 class CodegenError(QpmpcError):
@@ -100,6 +105,8 @@ class HostLibrary:
     state_bytes : size of one controller's memory
     functions : of the library, by their names in C
     remark : what a user should know about where it is kept, in one line; may be empty
+    solver_may_succeed : 0 lets the solver fail, for all controllers of this library; None if it
+        was not built for that
 
     Raises
     ------
@@ -148,20 +155,36 @@ class HostLibrary:
         for name, have, want in zip(_ABI_NAMES, found, expected, strict=True):
             if have != want:
                 raise CodegenError(f"{file}: {name} is {have}, expected {want}")
+        self.solver_may_succeed: ctypes.c_int32 | None = None
 
 
 def build_host_library(
-    values: Values, precision: Precision = "f64", algorithm: Algorithm = "admm"
+    values: Values,
+    precision: Precision = "f64",
+    algorithm: Algorithm = "admm",
+    *,
+    may_fail: bool = False,
 ) -> HostLibrary:
     """Generate, compile and load a controller.
+
+    Parameters
+    ----------
+    may_fail : with a switch that lets its solver fail, for the injection of faults
 
     Raises
     ------
     CodegenError
         If there is no compiler, or it fails, or its library cannot be loaded.
     """
-    kept = _kept(project_files(values, "host", precision, algorithm))
-    return HostLibrary(kept.file, values, precision, remark=kept.remark)
+    files = project_files(values, "host", precision, algorithm)
+    if may_fail:
+        files["mpc_step.c"] = MAY_FAIL + files["mpc_step.c"]
+    kept = _kept(files)
+    library = HostLibrary(kept.file, values, precision, remark=kept.remark)
+    if may_fail:
+        switch = ctypes.c_int32.in_dll(library.functions, "mpc_solver_may_succeed")
+        library.solver_may_succeed = switch
+    return library
 
 
 def compiled(files: Mapping[str, str]) -> Path:

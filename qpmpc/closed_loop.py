@@ -1,11 +1,14 @@
 """Closed loop: a controller drives a trip on the plant, second by second."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
 
 from qpmpc.controllers.base import Controller, Decision, Progress
+from qpmpc.faults.inject import Injection
+from qpmpc.faults.models import Faults
 from qpmpc.results import Run, Trajectory
 from qpmpc.trip import Observation, Trip
 
@@ -16,6 +19,7 @@ def drive(
     trip: Trip,
     controller: Controller,
     *,
+    faults: Faults | None = None,
     on_step: OnStep | None = None,
     progress: Progress | None = None,
 ) -> Run:
@@ -25,8 +29,9 @@ def drive(
     ----------
     trip : its cycle is the truth
     controller : made for this trip, and not used since
+    faults : to be injected; what they do to the trip is found by `qpmpc.simulate`
     on_step : called as on_step(observation, decision) after each decision, before the plant moves;
-        its time does not count as the controller's
+        its time does not count as the controller's; observations are without faults
     progress : called as progress(steps done, steps in all); before that, if a controller takes
         long to depart, with the controller's own count
 
@@ -34,7 +39,27 @@ def drive(
     ------
     QpmpcError
         If the controller belongs to another trip or has driven already.
+    InputError
+        If a fault would begin after the arrival.
     """
+    if faults:
+        controller.check_ready(trip)
+        injection = Injection(controller, faults)
+        try:
+            run = _drive(trip, controller, injection.decide, on_step, progress)
+            return replace(run, remarks=(*run.remarks, *injection.remarks))
+        finally:
+            injection.remove()
+    return _drive(trip, controller, controller.decide, on_step, progress)
+
+
+def _drive(
+    trip: Trip,
+    controller: Controller,
+    decide: Callable[[Observation], Decision],
+    on_step: OnStep | None,
+    progress: Progress | None,
+) -> Run:
     controller.begin(trip, progress)
     plant, steps = trip.plant, trip.steps
     record = Trajectory.empty(steps)
@@ -44,7 +69,7 @@ def drive(
     for t in range(steps):
         seen = trip.observation(t, state)
         start = perf_counter()
-        decision = controller.decide(seen)
+        decision = decide(seen)
         record.step_time_s[t] = perf_counter() - start
         if on_step is not None:
             on_step(seen, decision)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.controllers.base import Decision
+from qpmpc.controllers.monitor import Flag
 from qpmpc.limits import Excess, excess_of, sentence
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.parameters import Vehicle
@@ -28,7 +29,7 @@ class Trajectory:
     Attributes
     ----------
     soc, t_cl_degc : shape (steps + 1,)
-    all others : shape (steps,); `fallback` is the rung used, empty if none
+    all others : shape (steps,); `fallback` is the rung used, empty if none; `flags` as of `Flag`
     """
 
     soc: Floats
@@ -47,12 +48,13 @@ class Trajectory:
     iterations: NDArray[np.int64]
     relaxation_gap: Floats
     on_share: Floats
+    flags: NDArray[np.int64]
     fallback: list[str]
 
     @classmethod
     def empty(cls, steps: int) -> Self:
         """Make a trajectory to be filled in step by step."""
-        kinds = {"engine_on": bool, "started": bool, "iterations": np.int64}
+        kinds = {"engine_on": bool, "started": bool, "iterations": np.int64, "flags": np.int64}
         arrays: dict[str, Any] = {
             f.name: np.zeros(steps, dtype=kinds.get(f.name, float))
             for f in fields(cls)
@@ -71,7 +73,7 @@ class Trajectory:
         self.power_excess_w[t] = flows.power_excess_w
         self.iterations[t] = decision.iterations
         self.relaxation_gap[t], self.on_share[t] = decision.relaxation_gap, decision.on_share
-        self.fallback[t] = decision.fallback
+        self.flags[t], self.fallback[t] = decision.flags, decision.fallback
 
 
 @dataclass
@@ -85,6 +87,7 @@ class Run:
     remarks : what a user should know about the choices made for this run, one line each
     vehicle : parameters, overrides included
     trajectory : second by second
+    faults : what injected faults did, as plain data; see `qpmpc.faults.effects`
     """
 
     cycle: str
@@ -95,6 +98,7 @@ class Run:
     vehicle: Vehicle
     distance_km: float
     trajectory: Trajectory
+    faults: dict[str, Any] | None = None
 
     @property
     def fuel_g(self) -> float:
@@ -194,10 +198,18 @@ class Run:
                 *self.remarks,
                 *(f"{self.controller} on {self.cycle}: not comparable: {why}" for why in reasons),
             ],
+            "flags": flag_seconds(tr.flags),
+            **({} if self.faults is None else {"faults": self.faults}),
         }
 
 
 INTEGRAL = 0.02  # an on-share within this of 0 or 1 counts as integral
+
+
+def flag_seconds(flags: NDArray[np.int64]) -> dict[str, int]:
+    """Return for how many seconds each flag was raised, for those that were."""
+    seconds = {flag: int(np.count_nonzero(flags & flag)) for flag in Flag}
+    return {name: count for flag, count in seconds.items() if count for name in flag.names()}
 
 
 def _max(values: Floats) -> float | None:

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from qpmpc.closed_loop import OnStep, drive
 from qpmpc.controllers.base import Controller, Progress
@@ -9,6 +10,8 @@ from qpmpc.controllers.receding_horizon import Planner
 from qpmpc.controllers.settings import ControllerSettings, SettingsLike, as_settings
 from qpmpc.cycles import Cycle
 from qpmpc.errors import InputError
+from qpmpc.faults.effects import effect, fuel_change
+from qpmpc.faults.models import Faults, FaultsLike, as_faults
 from qpmpc.preview.forecast import Trace
 from qpmpc.registry import (
     ControllerLike,
@@ -34,6 +37,7 @@ def simulate(
     *,
     settings: SettingsLike | None = None,
     forecast: Trace | Cycle | None = None,
+    faults: FaultsLike | None = None,
     on_step: OnStep | None = None,
     progress: Progress | None = None,
 ) -> Run:
@@ -46,7 +50,10 @@ def simulate(
     vehicle : a shipped name, a TOML file or a `Vehicle`; the default one if None
     settings : of vehicle and controllers by dotted name, e.g. ``{"thermal.t_amb_degc": -15}``
     forecast : for the long horizon, instead of the truth
-    on_step, progress : see `drive`
+    faults : a TOML file, or a list of mappings with the keys of `qpmpc.faults.models.Fault`, to be
+        injected. The trip is then driven first without, then with each alone, then with all: the
+        run returned, whose `faults` has the effect of each
+    on_step, progress : see `drive`; `on_step` is called in the run returned
 
     Raises
     ------
@@ -56,10 +63,45 @@ def simulate(
         If the controller given belongs to another trip or has driven already.
     """
     check_controllers([controller])
+    injected = None if faults is None else as_faults(faults)
     trip, chosen = prepared(as_trip(cycle, vehicle, forecast), settings, [controller])
     made = make_controller(controller, trip, chosen)
     remark_idle_settings(made, settings, [controller])
-    return drive(trip, made, on_step=on_step, progress=progress)
+    if injected is None:
+        return drive(trip, made, on_step=on_step, progress=progress)
+    return _drive_under(injected, trip, made, on_step, progress)
+
+
+def _drive_under(
+    faults: Faults,
+    trip: Trip,
+    controller: Controller,
+    on_step: OnStep | None,
+    progress: Progress | None,
+) -> Run:
+    """Drive without faults, with each alone and with all, and compare."""
+    faults.check_within(trip.steps)
+    sets = [None, *(Faults([fault]) for fault in faults), faults]
+    jobs = len(sets)
+    runs: list[Run] = []
+    for number, those in enumerate(sets):
+        controller.reset()
+
+        def report(done: int, total: int, before: int = number) -> None:
+            if progress is not None:
+                progress(before * total + done, jobs * total)
+
+        on = on_step if number == jobs - 1 else None
+        runs.append(drive(trip, controller, faults=those, on_step=on, progress=report))
+    unfaulted, *each, together = runs
+    return replace(
+        together,
+        faults={
+            "unfaulted_fuel_soc_balanced_g": unfaulted.fuel_soc_balanced_g,
+            **fuel_change(together, unfaulted),
+            "each": [effect(f, run, unfaulted) for f, run in zip(faults, each, strict=True)],
+        },
+    )
 
 
 def prepared(

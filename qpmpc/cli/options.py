@@ -42,6 +42,15 @@ JsonOption = Annotated[
         show_default=False,
     ),
 ]
+InjectOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--inject",
+        metavar="FAULTS.toml",
+        help="Drive under the faults of this file, and say what each of them did.",
+        show_default=False,
+    ),
+]
 OutOption = Annotated[
     Path | None,
     typer.Option("--out", metavar="DIR", help="Write files into this folder.", show_default=False),

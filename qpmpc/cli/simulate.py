@@ -4,7 +4,14 @@ from typing import Annotated
 
 import typer
 
-from qpmpc.cli.options import CycleArgument, JsonOption, OutOption, SetOption, VehicleOption
+from qpmpc.cli.options import (
+    CycleArgument,
+    InjectOption,
+    JsonOption,
+    OutOption,
+    SetOption,
+    VehicleOption,
+)
 
 
 def simulate(
@@ -15,6 +22,7 @@ def simulate(
     ] = "mh-qp",
     vehicle: VehicleOption = "prius-nimh",
     set_: SetOption = None,
+    inject: InjectOption = None,
     json_file: JsonOption = None,
     out: OutOption = None,
 ) -> None:
@@ -29,9 +37,13 @@ def simulate(
       qpmpc simulate my_trip.csv --vehicle prius-liion --out results
 
       qpmpc simulate udds --set thermal.t_amb_degc=-15 --set mh_qp.admm.iterations=25 --json -
+
+      qpmpc simulate nycc --inject my_faults.toml
     """
     from qpmpc.cli.console import progress_bar, result_console, write_json
     from qpmpc.cli.inputs import check_outputs
+    from qpmpc.faults.effects import sentences
+    from qpmpc.faults.models import load_faults
     from qpmpc.registry import check_controllers
     from qpmpc.report.columns import SIMULATE_COLUMNS, notes
     from qpmpc.report.table import print_rows
@@ -42,14 +54,17 @@ def simulate(
 
     check_controllers([controller])
     settings = parse_settings(set_ or [])
+    faults = None if inject is None else load_faults(inject)
     trip = Trip(cycle, vehicle)
     check_outputs(json_file, out)
     with progress_bar(1) as bar:
         report = bar.next_job(f"{trip.cycle.name}, {controller}")
-        finished = run(trip, controller, settings=settings, progress=report)
+        finished = run(trip, controller, settings=settings, faults=faults, progress=report)
     summary = finished.summary()
     write_json(summary, json_file)
     remarks = [*notes([summary]), *summary["remarks"]]
+    if finished.faults is not None:
+        remarks += sentences(finished.faults)
     if out is not None:
         remarks += write_run(finished, out)
     console = result_console(json_file)

@@ -14,10 +14,12 @@ from qpmpc.controllers.monitor import NOTHING_WRONG, Flag, InputMonitor
 from qpmpc.controllers.safety import SafetyLayer
 from qpmpc.controllers.settings import SettingsLike, as_settings
 from qpmpc.errors import InputError, QpmpcError
+from qpmpc.preview.stages import Preview
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.plant import Command
 
 Progress = Callable[[int, int], None]
+Receive = Callable[[int], Preview]  # of a second
 
 
 class Decision(NamedTuple):
@@ -63,6 +65,7 @@ class Driver:
 
     name: str = ""
     solver_name: str = ""
+    solver_fails: bool = False  # by injection: what the solver returns this second is unusable
     Settings: ClassVar[type[BaseModel] | None] = None
     _has_name: ClassVar[bool] = False  # its own, or from a class above it
 
@@ -183,6 +186,22 @@ class Controller(Driver, ABC):
     def forget(self) -> None:
         """Forget what a restart of the ECU under way would lose: here, the measurements."""
         self.monitor.forget()
+
+    def inject(
+        self, hearing: Callable[[Receive], Receive] | None, solver: bool = False
+    ) -> frozenset[str]:
+        """Prepare for faults inside, or without `hearing` go back to normal; see `Injection`.
+
+        Parameters
+        ----------
+        hearing : from where previews are received, to where faulty ones are
+        solver : whether `solver_fails` will be set
+
+        Returns
+        -------
+        which of "preview" and "solver" there are
+        """
+        return frozenset()
 
     def check_ready(self, trip: Trip) -> None:
         """Check that the controller can start a run of this trip.

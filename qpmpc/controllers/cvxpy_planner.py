@@ -71,7 +71,8 @@ class CvxpyPlanner(Planner):
         self.forget()
 
     def forget(self) -> None:
-        """Expand the coolant without a last plan, as after a restart of the ECU under way."""
+        """Forget preview and last plan, as after a restart of the ECU under way."""
+        self.preview.forget()
         self._about = None
 
     def plan(self, seen: Observation) -> Plan:
@@ -80,8 +81,10 @@ class CvxpyPlanner(Planner):
         self.program.update(self.preview.at(seen.step), seen.soc, seen.t_cl_degc, about)
         try:
             x = self.program.solve(self.solver)
+            if self.solver_fails:
+                raise QpmpcError("failure injected")
         except QpmpcError as error:
-            self.forget()
+            self._about = None
             return Plan.none(str(error))
         # short stages move up by one second until the next time
         layout = self.preview.settings

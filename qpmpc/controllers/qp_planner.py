@@ -1,7 +1,7 @@
 """Planner of `mh-qp`: one QP per second, expanded about and started from the last plan, shifted."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.rows import VARS, Var
 from qpmpc.qp.stage_qp import QpData, StageQp
-from qpmpc.solvers.base import QpSolution, QpSolver, consistent, failed
+from qpmpc.solvers.base import QpSolution, QpSolver, Status, consistent, failed
 from qpmpc.solvers.names import make_solver
 from qpmpc.solvers.osqp import Osqp
 from qpmpc.solvers.settings import AdmmSettings
@@ -213,6 +213,8 @@ class QpPlanner(Planner):
             solution = self.solver.solve(data, primal, dual, cold=cold)
         else:
             solution = failed(data)
+        if self.solver_fails:
+            solution = replace(solution, status=Status.FAILED)
         if self.on_solve is not None:
             self.on_solve(Solve(data, primal, dual, cold, solution))
         return QpPlan(

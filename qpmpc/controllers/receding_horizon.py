@@ -1,13 +1,21 @@
 """The receding-horizon loop: plan, realise on/off, keep safe, degrade in steps. Written once."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpmpc.controllers.base import Controller, Decision, Driver, Progress, base_not_called
+from qpmpc.controllers.base import (
+    Controller,
+    Decision,
+    Driver,
+    Progress,
+    Receive,
+    base_not_called,
+)
 from qpmpc.controllers.monitor import NOTHING_WRONG, Flag
 from qpmpc.controllers.rule_based import RuleBased
 from qpmpc.controllers.settings import SettingsLike
@@ -155,10 +163,14 @@ class RecedingHorizon(Controller):
 
     def _plan(self, seen: Observation) -> Plan:
         """Plan of this second; none where there is no preview."""
+        self.planner.solver_fails = self.solver_fails
         try:
-            return self._checked(self.planner.plan(seen), seen.step)
+            plan = self._checked(self.planner.plan(seen), seen.step)
         except NoPreviewError:
             return Plan.none(flags=Flag.BAD_PREVIEW)
+        if self.solver_fails and plan.usable:  # a planner that knows of no injection
+            return Plan.none(iterations=plan.iterations)
+        return plan
 
     def _checked(self, plan: Plan, second: int) -> Plan:
         """Refuse what is no plan; take one that is not finite as unusable."""
@@ -180,6 +192,18 @@ class RecedingHorizon(Controller):
             self._has_reason = True
             self.remarks.append(f"{self.name}: no plan at {second} s: {plan.reason}")
         return plan
+
+    def inject(
+        self, hearing: Callable[[Receive], Receive] | None, solver: bool = False
+    ) -> frozenset[str]:
+        """Prepare the planner for faults; see `Controller.inject`."""
+        self.planner.solver_fails = False
+        preview = getattr(self.planner, "preview", None)
+        if not isinstance(preview, CheckedPreview):
+            return frozenset({"solver"})
+        right = preview.source.preview
+        preview.receive = right if hearing is None else hearing(right)
+        return frozenset({"preview", "solver"})
 
     def forget(self) -> None:
         """Forget measurements, plan, warm start and the rules' memory, as after a restart."""

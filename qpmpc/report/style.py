@@ -26,6 +26,7 @@ CONTROLLER_STYLES = {
 }
 SPARE_STYLES = ((BLUE, "-"), (YELLOW, "-"), (BLUE, (0, (1, 1))), (YELLOW, (0, (1, 1))))
 LIMIT: dict[str, Any] = {"color": "#AA0000", "linewidth": 0.8, "linestyle": (0, (1, 2))}
+FAULT: dict[str, Any] = {"color": PURPLE, "alpha": 0.3, "linewidth": 0.0}
 
 DPI = 110
 

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from qpmpc.report.style import BLACK, BLUE, LIMIT, ORANGE, line_style, png, tidy
+from qpmpc.report.style import BLACK, BLUE, FAULT, LIMIT, ORANGE, line_style, png, tidy
 from qpmpc.results import Run
 
 WIDTH_IN, UNIT_IN = 9.0, 1.25
@@ -17,7 +17,8 @@ SPEED_HEIGHT, SPLIT_HEIGHT, STATE_HEIGHT = 0.7, 1.0, 1.15
 def draw_trajectories(runs: Sequence[Run]) -> bytes:
     """Draw runs of one vehicle on one cycle.
 
-    Each has a panel for its power split; SOC, coolant and fuel are drawn over each other.
+    Each has a panel for its power split; SOC, coolant and fuel are drawn over each other. Injected
+    faults are shaded.
 
     Returns
     -------
@@ -37,6 +38,7 @@ def draw_trajectories(runs: Sequence[Run]) -> bytes:
         _states(soc, coolant, fuel, run, i)
     _limits(soc, coolant, runs[0])
     for axes in panels:
+        _faults(axes, runs)
         tidy(axes)
     splits[0].legend(ncols=3, **LEGEND)
     soc.legend(ncols=len(runs) + 1, **LEGEND)
@@ -105,6 +107,13 @@ def _states(soc: Axes, coolant: Axes, fuel: Axes, run: Run, index: int) -> None:
     coolant.set_ylabel("coolant\n°C")
     fuel.set_ylabel("fuel burnt\ng")
     fuel.set_ylim(bottom=0)
+
+
+def _faults(axes: Axes, runs: Sequence[Run]) -> None:
+    """Shade the seconds of injected faults."""
+    for run in runs:
+        for each in run.faults["each"] if run.faults else ():
+            axes.axvspan(each["at_s"], each["at_s"] + each["for_s"], **FAULT)
 
 
 def _limits(soc: Axes, coolant: Axes, run: Run) -> None:

@@ -6,6 +6,7 @@ from io import StringIO
 import numpy as np
 from numpy.typing import NDArray
 
+from qpmpc.controllers.monitor import Flag
 from qpmpc.results import Run, Trajectory
 
 STATES = ("soc", "t_cl_degc")
@@ -24,14 +25,15 @@ FLOWS = (
     "relaxation_gap",
     "on_share",
 )
-COLUMNS = ("time_s", *STATES, *FLOWS, "fallback")
+COLUMNS = ("time_s", *STATES, *FLOWS, "fallback", "flags")
 
 
 def trajectory_csv(run: Run) -> str:
     """Return the trajectory of a run as CSV.
 
     A row holds the state at `time_s` and the flows of the second that starts there; the last row
-    is the final state alone. Cells are empty where a controller has no such figure.
+    is the final state alone. Cells are empty where a controller has no such figure. Several flags
+    are joined by " + ".
     """
     trajectory = run.trajectory
     steps = len(trajectory.fuel_g)
@@ -40,9 +42,9 @@ def trajectory_csv(run: Run) -> str:
     writer.writerow(COLUMNS)
     states = [_cells(getattr(trajectory, name)) for name in STATES]
     flows = [[*_cells(_flow(trajectory, name)), ""] for name in FLOWS]
-    writer.writerows(
-        zip(range(steps + 1), *states, *flows, [*trajectory.fallback, ""], strict=True)
-    )
+    words = [" + ".join(Flag(each).names()) for each in trajectory.flags.tolist()]
+    said = [*trajectory.fallback, ""], [*words, ""]
+    writer.writerows(zip(range(steps + 1), *states, *flows, *said, strict=True))
     return text.getvalue()
 
 

@@ -14,6 +14,7 @@ from qpmpc.report.pwa_curves import pwa_curves
 from qpmpc.report.pwa_picture import draw_pwa
 from qpmpc.report.style import BLUE, CONTROLLER_STYLES, GREEN, ORANGE, VERMILION
 from qpmpc.report.trajectories import draw_trajectories
+from qpmpc.simulation import simulate
 from qpmpc.vehicle import load_vehicle, vehicle_names
 
 
@@ -27,6 +28,15 @@ def test_trajectories_show_each_run_and_the_power_split(runs):
     png = draw_trajectories(runs)
     for color in (ORANGE, BLUE, *(CONTROLLER_STYLES[run.controller][0] for run in runs)):
         assert pixels_of(png, color) > 100
+
+
+def test_the_seconds_of_faults_are_shaded():
+    trip = load_cycle("nycc")
+    faults = [{"kind": "wild", "at_s": 100, "for_s": 100}]
+    plain, faulted = (simulate(trip, "ecms", faults=given) for given in (None, faults))
+    images = [imread(BytesIO(draw_trajectories([run]))) for run in (plain, faulted)]
+    differs = np.abs(images[0] - images[1]).max(axis=(0, 2)) > 0.01  # by column of pixels
+    assert 0.12 < differs.mean() < 0.18  # 100 of 598 s, less the margins
 
 
 def test_trajectories_of_one_run(runs):

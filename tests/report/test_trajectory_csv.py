@@ -9,7 +9,7 @@ import pytest
 from qpmpc.report.trajectory_csv import COLUMNS, trajectory_csv
 
 DIMENSIONLESS = {
-    "soc", "engine_on", "iterations", "relaxation_gap", "on_share", "fallback",
+    "soc", "engine_on", "iterations", "relaxation_gap", "on_share", "fallback", "flags",
 }  # fmt: skip
 UNITS = ("_s", "_mps", "_w", "_g", "_degc")
 

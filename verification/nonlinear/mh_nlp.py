@@ -55,7 +55,8 @@ class MhNlp(Planner):
         return Plan(on_share, powers_w, True, solved.iterations)
 
     def forget(self) -> None:
-        """Forget the last solution, as after a restart of the controller under way."""
+        """Forget preview and last solution, as after a restart of the controller under way."""
+        self.preview.forget()
         self._last = None
 
     def solve(self, seen: Observation) -> NlpPlan:
@@ -72,6 +73,8 @@ class MhNlp(Planner):
         if not plan.solved and start is not None:
             again = self.solver.solve(stages, seen.soc, seen.t_cl_degc)
             plan = replace(again, iterations=again.iterations + plan.iterations)
+        if self.solver_fails:
+            plan = replace(plan, solved=False)
         if plan.solved:
             self._last, self._last_step = plan, seen.step
         return plan

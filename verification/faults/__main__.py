@@ -1,0 +1,46 @@
+"""``python -m qpmpc.verification.faults [PAGE]``: write the tables of docs/faults.md anew."""
+
+import argparse
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress
+
+from qpmpc.errors import InputError
+from qpmpc.files import write_text
+from qpmpc.vehicle import vehicle_names
+from qpmpc.verification.faults.standard import standard_faults
+from qpmpc.verification.faults.table import measured, summary, table
+
+BEGIN, END = "<!-- faults: written by python -m qpmpc.verification.faults -->", "<!-- end -->"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Write the tables between the marks of a page; see the module."""
+    parser = argparse.ArgumentParser(prog="python -m qpmpc.verification.faults")
+    parser.add_argument("page", type=Path, nargs="?", default=Path("docs/faults.md"))
+    page = parser.parse_args(arguments).page
+    text = page.read_text("utf-8")
+    if not 0 <= text.find(BEGIN) < text.find(END):
+        raise InputError(f"{page}: no marks {BEGIN} and {END}")
+    faults, cars = standard_faults(), vehicle_names()
+    with (
+        ProcessPoolExecutor() as pool,
+        Progress(console=Console(stderr=True), transient=True) as bar,
+    ):
+        each = [(fault, car) for car in cars for fault in faults]
+        found = pool.map(measured, *zip(*each, strict=True))
+        rows = list(bar.track(found, total=len(each), description="faults"))
+    parts = []
+    for car in cars:
+        of_car, rows = rows[: len(faults)], rows[len(faults) :]
+        parts.append(f"### {car}\n\n{car}: {summary(of_car)}\n\n{table(of_car)}")
+    before, after = text.partition(BEGIN)[0], text.partition(END)[2]
+    write_text(page, before + BEGIN + "\n\n" + "\n".join(parts) + "\n" + END + after)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
