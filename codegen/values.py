@@ -9,6 +9,7 @@ from qpmpc.codegen.forecast_values import fixed_block_s, forecast_scalars
 from qpmpc.controllers import monitor, qp_planner, receding_horizon, safety
 from qpmpc.controllers.qp_planner import DEPARTURE_LINEARISATIONS, WARM_UP_STEPS
 from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS
+from qpmpc.controllers.rule_based import last_rung
 from qpmpc.controllers.settings import MhQpSettings, RuleBasedSettings
 from qpmpc.errors import InputError
 from qpmpc.preview import checked
@@ -149,7 +150,7 @@ def values_of(
         **qp_parameters(vehicle, model, settings.qp, settings.scaling),
         **_plant(vehicle, line, maps),
         **_solver(settings.admm),
-        **_rules(vehicle, rules),
+        **_rules(vehicle, last_rung(rules, vehicle)),
         **forecast_scalars(vehicle, settings.horizon),
     }
     if not settings.qp.soc_penalty_g:

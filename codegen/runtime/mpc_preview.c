@@ -1,8 +1,8 @@
 /* Check of the preview: possible for this car, and going on from the one received before.
  *
  * Each second that passes takes at most a second, and what is driven in it, out of the statistics
- * of the trip; NEWS is the share of the trip that may change beside that. A new route is therefore
- * used from its second second on.
+ * of the trip, so that the same message again is not news; NEWS is the share of the trip that may
+ * change beside that. A new route is therefore used from its second second on.
  */
 #include "mpc_constants.h"
 #include "mpc_model.h"
@@ -40,6 +40,20 @@ int32_t mpc_preview_check_kept(const mpc_state *state)
         fine &= is_stage(road->duration_s, road->net_w, road->speed_mps, road->internal_off_w);
     }
     return fine;
+}
+
+/* The same message once more. */
+static int32_t is_same(const mpc_heard *before, const mpc_in *in)
+{
+    int32_t same = (before->short_count == in->short_count) ? 1 : 0;
+    for (int32_t k = 0; k < MPC_SHORT; k++) {
+        same &= within(in->short_demand_w[k], before->short_demand_w[k], before->short_demand_w[k]);
+    }
+    for (int32_t k = 0; k < MPC_LONG; k++) {
+        same &=
+            within(in->long_duration_s[k], before->long_duration_s[k], before->long_duration_s[k]);
+    }
+    return same;
 }
 
 static int32_t goes_on(const mpc_heard *before, const mpc_in *in)
@@ -84,6 +98,7 @@ static void hear(mpc_heard *heard, const mpc_in *in)
         heard->long_net_w[k] = in->long_net_w[k];
         heard->long_internal_off_w[k] = in->long_internal_off_w[k];
     }
+    heard->short_count = in->short_count;
     heard->age = 0;
 }
 
@@ -101,7 +116,8 @@ int32_t mpc_preview_check(mpc_heard *heard, const mpc_in *in, int32_t elapsed)
 {
     heard->age = ((heard->age + elapsed) < MPC_NO_PLAN) ? (heard->age + elapsed) : MPC_NO_PLAN;
     const int32_t possible = is_possible(in);
-    const int32_t follows = goes_on(heard, in);
+    const int32_t is_news = ((heard->age == 0) || (is_same(heard, in) == 0)) ? 1 : 0;
+    const int32_t follows = goes_on(heard, in) & is_news;
     const int32_t fine = possible & ((heard->age == MPC_NO_PLAN) ? 1 : follows);
     if (possible != 0) {
         hear(heard, in);

@@ -67,6 +67,7 @@ typedef struct {
     mpc_real long_duration_s[MPC_LONG];
     mpc_real long_net_w[MPC_LONG];
     mpc_real long_internal_off_w[MPC_LONG];
+    int32_t short_count;
     int32_t age; /* seconds since then; MPC_NO_PLAN if there is none */
 } mpc_heard;
 

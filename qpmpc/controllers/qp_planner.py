@@ -24,7 +24,7 @@ from qpmpc.trip import Observation, Trip
 Floats = NDArray[np.float64]
 
 DEPARTURE_LINEARISATIONS = 5
-FAILURES_FORGIVEN = 2  # unusable solutions in a row after which the last usable plan is kept
+FAILURES_FORGIVEN = 10  # unusable solutions in a row after which the last usable plan is kept
 WARM_UP_STEPS = 5  # of K iterations; measured: fewer gain nothing, with more the rules drive longer
 
 

@@ -17,7 +17,7 @@ from qpmpc.controllers.base import (
     base_not_called,
 )
 from qpmpc.controllers.monitor import NOTHING_WRONG, Flag
-from qpmpc.controllers.rule_based import RuleBased
+from qpmpc.controllers.rule_based import RuleBased, last_rung
 from qpmpc.controllers.settings import SettingsLike
 from qpmpc.errors import QpmpcError
 from qpmpc.preview.checked import CheckedPreview, NoPreviewError
@@ -25,7 +25,7 @@ from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.plant import Command
 
 ON_THRESHOLD = 0.5  # share of a 1 s stage from which on the engine runs
-PLAN_VALID_STEPS = 3  # how many steps an old plan may drive before the rules take over
+PLAN_VALID_STEPS = 10  # how many steps an old plan may drive before the rules take over
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,8 @@ class RecedingHorizon(Controller):
         if type(self) is RecedingHorizon:  # a subclass has its own
             self.name = planner.name
         self.solver_name = planner.solver_name
-        self._rules = RuleBased(trip, self.settings)
+        rules = last_rung(self.settings.rule_based, trip.vehicle)
+        self._rules = RuleBased(trip, self.settings, rules)
         self._old: Plan | None = None
         self._old_step = 0
         self._has_reason = False

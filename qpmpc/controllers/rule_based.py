@@ -3,7 +3,26 @@
 from qpmpc.controllers.base import Controller, Progress
 from qpmpc.controllers.settings import ControllerSettings, RuleBasedSettings
 from qpmpc.trip import Observation, Trip
+from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.plant import Command
+
+
+LAST_RUNG_HEAT_K = (1.0, 3.0)  # above the lower coolant limit: heat request on and off
+
+
+def last_rung(rules: RuleBasedSettings, vehicle: Vehicle) -> RuleBasedSettings:
+    """Return the rules that drive for some seconds where there is no plan.
+
+    They ask for heat near the lower coolant limit only: what a plan saves by keeping the coolant
+    cooler than the rules would is otherwise lost in every such second.
+    """
+    least = vehicle.thermal.t_cl_min_degc
+    on_degc, off_degc = (least + above for above in LAST_RUNG_HEAT_K)
+    update = {
+        "heat_on_degc": min(rules.heat_on_degc, on_degc),
+        "heat_off_degc": min(rules.heat_off_degc, off_degc),
+    }
+    return rules.model_copy(update=update)
 
 
 class RuleBased(Controller):

@@ -29,7 +29,8 @@ class CheckedPreview:
     """The stages of each second, from plausible previews only.
 
     A preview is plausible if the car can drive it and if it goes on from the one received before:
-    a second that passes takes a second out of the trip ahead. A new route is therefore used from
+    a second that passes takes a second out of the trip ahead, so that the same message again is not
+    news. A new route is therefore used from
     its second second on. In place of one that is not plausible the last good one serves for up to
     N - 1 seconds: its short stages move up and are masked at the end, its long ones are still
     ahead.
@@ -122,6 +123,8 @@ class CheckedPreview:
             return True
         passed = step - self._received_step
         old, new = before.long, preview.long
+        if passed > 0 and _is_same(before, preview):
+            return False  # an old message once more
         free_s = 2.0 * passed + NEWS * float(old.duration_s.sum())
         kept = self.settings.short_stages - passed
         news_w = np.abs(preview.short_demand_w[: max(kept, 0)] - before.short_demand_w[passed:])
@@ -132,6 +135,14 @@ class CheckedPreview:
             <= free_s * (can.internal_max_w - can.internal_min_w)
             and float(news_w.sum()) <= NEWS * self.settings.short_stages * can.net_max_w
         )
+
+
+def _is_same(one: Preview, other: Preview) -> bool:
+    return (
+        one.short_count == other.short_count
+        and np.array_equal(one.short_demand_w, other.short_demand_w)
+        and np.array_equal(one.long.duration_s, other.long.duration_s)
+    )
 
 
 def _moved(old: Stages, new: Stages, field: str) -> float:

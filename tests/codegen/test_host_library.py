@@ -18,6 +18,7 @@ from qpmpc.controllers.base import Decision
 from qpmpc.controllers.mh_qp import MhQp
 from qpmpc.controllers.monitor import Flag
 from qpmpc.controllers.qp_planner import FAILURES_FORGIVEN, WARM_UP_STEPS
+from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.errors import InputError
@@ -207,10 +208,11 @@ def test_bad_input_is_named_and_costs_no_plan(precision, spoilt, flag) -> None:
 def test_without_a_preview_for_long_the_rules_take_over() -> None:
     raw = Raw()
     raw.step(0)
-    rungs = [raw.step(k, short_count=0).rung for k in range(1, 26)]
-    # the last good preview reaches for N - 1 = 19 s, and the plan made from it for three more
-    assert rungs == [0] * 19 + [1] * 3 + [2] * 3
-    assert raw.step(26).rung == 0
+    rungs = [raw.step(k, short_count=0).rung for k in range(1, 33)]
+    # the last good preview reaches for N - 1 = 19 s, and the plan made from it for some more
+    old = PLAN_VALID_STEPS
+    assert rungs == [0] * 19 + [1] * old + [2] * (13 - old)
+    assert raw.step(33).rung == 0
 
 
 def test_measurements_that_the_car_cannot_reach_are_not_believed_at_once() -> None:
@@ -320,6 +322,19 @@ def test_a_wild_second_of_the_preview_costs_no_plan() -> None:
     assert all(d.flags in (0, BAD_PREVIEW) and not d.fallback for d in found)
 
 
+def test_an_old_message_once_more_is_no_preview() -> None:
+    frozen: list[Preview] = []
+
+    def stale(preview: Preview) -> Preview:
+        frozen.append(preview)
+        return frozen[0]
+
+    found = decisions_with(stale, range(SPOILT, SPOILT + 6), SPOILT + 8)
+    # the pair asks twice a second; the first frozen message is that of its own second
+    assert [k for k, d in enumerate(found) if d.flags] == list(range(SPOILT + 1, SPOILT + 6))
+    assert not any(d.fallback for d in found)
+
+
 def test_a_new_route_is_taken_from_its_second_second_on() -> None:
     longer = decisions_with(lambda p: _longer(p, 2.0), range(SPOILT, SPOILT + 9), SPOILT + 9)
     assert [k for k, d in enumerate(longer) if d.flags] == [SPOILT]
@@ -340,7 +355,7 @@ def test_when_solves_fail_again_and_again_both_start_cold(monkeypatch) -> None:
     strict = 300.0  # solver units: on this trip a plan stays below 100
     monkeypatch.setattr(base, "LARGEST_PLAUSIBLE", strict)
     monkeypatch.setitem(CONSTANTS[base.__name__], "LARGEST_PLAUSIBLE", strict)
-    steps = SPOILT + 12
+    steps = SPOILT + PLAN_VALID_STEPS + 8
     found = decisions_with(far_more_of_the_same, range(SPOILT, steps), steps)
     failed = [bool(d.flags & Flag.SOLVER_FAILED) for d in found]
     assert sum(failed) > FAILURES_FORGIVEN

@@ -40,7 +40,7 @@ def stages_agree(context: Context) -> Iterator[Check]:
     for loop in context.loops:
         worst = 0.0
         for step in samples(context, loop):
-            ours = loop.controller.planner.preview.at(step)
+            ours = loop.controller.planner.preview.source.at(step)
             theirs = horizon(loop.trip.cycle, loop.run.vehicle, loop.settings, step)
             pairs = (
                 (ours.duration_s, theirs.h),

@@ -51,7 +51,7 @@ def expansion_error(loop: Loop, step: int) -> tuple[float, float]:
     about_t, about_f, *_ = expansion(loop.x(step - 1), loop.settings, measured)
     ends = x[:, T_CL]
     mean = 0.5 * (ends + np.concatenate([[measured], ends[:-1]]))
-    h = controller.planner.preview.at(step).duration_s
+    h = controller.planner.preview.source.at(step).duration_s
     curve = controller.planner.qp.model.alpha
     expanded = curve(about_t) * x[:, FUEL] + curve.active_slope(about_t) * about_f * (
         mean - about_t

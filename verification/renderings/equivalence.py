@@ -118,7 +118,7 @@ class Renderings:
         """Return the data for updating the renderings in Python."""
         seen = case.seen
         about = Linearisation.about(case.x, seen.t_cl_degc, self.preview.settings)
-        return self.preview.at(seen.step), seen.soc, seen.t_cl_degc, about
+        return self.preview.source.at(seen.step), seen.soc, seen.t_cl_degc, about
 
     def compare(self, case: QpCase) -> dict[str, Difference]:
         """Build and solve one case in all renderings."""

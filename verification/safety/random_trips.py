@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from qpmpc.closed_loop import drive
+from qpmpc.controllers.mh_qp import MhQp
 from qpmpc.cycles import Cycle, cycle_names, load_cycle
 from qpmpc.preview.forecast_errors import MODELS, forecast
-from qpmpc.simulation import simulate
 from qpmpc.trip import Trip
 from qpmpc.vehicle import load_vehicle, vehicle_names
 from qpmpc.verification.independent.equations import Floats
@@ -59,13 +60,12 @@ def random_trip(seed: int) -> tuple[Trip, dict[str, float], str]:
     return Trip(cycle, vehicle, said), settings, kind
 
 
-def drive_one(seed: int, controller: str = "mh-qp") -> Outcome:
-    """Make a trip and drive it; Python, so that no car needs a library of its own."""
+def drive_one(seed: int) -> Outcome:
+    """Make a trip and drive it; in Python, so that no car needs a library of its own."""
     trip, settings, kind = random_trip(seed)
     row, error = None, ""
     try:
-        run = simulate(trip, controller, settings={"mh_qp.implementation": "python"})
-        row = run.summary()
+        row = drive(trip, MhQp(trip)).summary()
     except Exception as failure:  # the study goes on, and counts it
         error = f"{type(failure).__name__}: {failure}"
     return Outcome(seed, trip.steps, trip.vehicle.name, settings, kind, row, error)
