@@ -6,7 +6,6 @@ from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.plant import Command
 
-
 LAST_RUNG_HEAT_K = (1.0, 3.0)  # above the lower coolant limit: heat request on and off
 
 
