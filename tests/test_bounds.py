@@ -239,7 +239,10 @@ def test_cars_that_are_odd_in_several_ways_run_or_are_refused(data, controller):
     changes = {n.name: data.draw(st.sampled_from([n.least, n.greatest])) for n in odd}
     if refusal(changes):
         return
-    run = simulate(TRIP, controller, settings={**FAST, **SMALL_QP, **changes})
+    try:
+        run = simulate(TRIP, controller, settings={**FAST, **SMALL_QP, **changes})
+    except InputError:  # what only the plant or a curve can tell
+        return
     assert all(np.isfinite(values).all() for values in (run.trajectory.soc, run.trajectory.fuel_g))
     assert np.isfinite(run.trajectory.t_cl_degc).all()
 

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from qpmpc.controllers.mh_qp import MhQp
+from qpmpc.controllers.qp_planner import FAILURES_FORGIVEN, WARM_UP_STEPS
+from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import load_cycle
 from qpmpc.errors import InputError
@@ -119,11 +121,13 @@ def test_one_failure_is_bridged_by_the_shifted_plan():
 
 
 def test_failures_beyond_those_forgiven_cost_the_plan():
-    failing = {*range(50, 53)}  # one more than is forgiven: cold from the next step on
-    run = _with_solver(load_cycle("nycc"), Flaky(failing))
-    rungs = run.trajectory.fallback[49:58]
-    # the old plan drives for three seconds, then the rules until the fifth solve since the reset
-    assert list(rungs) == ["shifted plan"] * 3 + ["rule-based"] * 4 + [""] * 2
+    # one more than is forgiven: cold from the next step on
+    count = FAILURES_FORGIVEN + 1
+    run = _with_solver(load_cycle("nycc"), Flaky({*range(50, 50 + count)}))
+    rungs = run.trajectory.fallback[49 : 49 + count + WARM_UP_STEPS + 1]
+    # the old plan drives as long as it is valid, then the rules until enough solves since the reset
+    rules = ["rule-based"] * (count + WARM_UP_STEPS - 1 - PLAN_VALID_STEPS)
+    assert list(rungs) == ["shifted plan"] * PLAN_VALID_STEPS + rules + [""] * 2
     assert run.summary()["violations"] == NO_VIOLATION
 
 

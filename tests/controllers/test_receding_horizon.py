@@ -20,7 +20,7 @@ from qpmpc import (
 from qpmpc.closed_loop import drive
 from qpmpc.controllers.qp_planner import FAILURES_FORGIVEN, WARM_UP_STEPS, QpPlanner
 from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS
-from qpmpc.controllers.rule_based import RuleBased
+from qpmpc.controllers.rule_based import RuleBased, last_rung
 from qpmpc.controllers.settings import ControllerSettings, RuleBasedSettings
 from qpmpc.solvers import Status
 from qpmpc.solvers.osqp import Osqp
@@ -68,13 +68,13 @@ def driven(planner: Planner) -> tuple[list[str], list[Command]]:
     return [d.fallback for d in decisions], [d.command for d in decisions]
 
 
-def test_plan_then_shifted_plan_for_three_steps_then_rules_then_plan() -> None:
+def test_plan_then_shifted_plan_for_some_steps_then_rules_then_plan() -> None:
     planner = Steady(Trip(PART))
-    planner.failing = frozenset(range(20, 27))
+    planner.length, last = 2 * PLAN_VALID_STEPS, 20 + PLAN_VALID_STEPS + 4
+    planner.failing = frozenset(range(20, last))
     rungs, commands = driven(planner)
     shifted = ["shifted plan"] * PLAN_VALID_STEPS
-    assert PLAN_VALID_STEPS == 3
-    assert rungs[19:28] == ["", *shifted, *["rule-based"] * 4, ""]
+    assert rungs[19 : last + 1] == ["", *shifted, *["rule-based"] * 4, ""]
     # the power planned for that second, while on: mean over the share
     for age, command in enumerate(commands[19:23]):
         wish = Command(True, (8e3 + 100.0 * age) / 0.8)
@@ -82,7 +82,7 @@ def test_plan_then_shifted_plan_for_three_steps_then_rules_then_plan() -> None:
         if command.p_eng_w != pytest.approx(wish.p_eng_w):  # where the battery cannot take it
             assert command.p_eng_w < wish.p_eng_w
             assert seen.demand_w < 0.0
-    assert set(rungs[28:]) == {""}
+    assert set(rungs[last:]) == {""}
 
 
 def test_a_plan_is_no_longer_used_than_it_is_long() -> None:
@@ -98,19 +98,20 @@ def test_without_any_plan_the_rules_drive_as_if_alone() -> None:
     planner.failing = frozenset(range(trip.steps))
     rungs, commands = driven(planner)
     assert set(rungs) == {"rule-based"}
-    alone = []
-    drive(trip, RuleBased(trip), on_step=lambda _, decision: alone.append(decision.command))
+    alone, rules = [], last_rung(RuleBasedSettings(), trip.vehicle)
+    rules_alone = RuleBased(trip, rules=rules)
+    drive(trip, rules_alone, on_step=lambda _, decision: alone.append(decision.command))
     assert commands == alone
 
 
 def test_rules_of_the_last_rung_are_those_of_the_planners_settings() -> None:
     trip = Trip(PART)
-    rules = RuleBasedSettings(on_w=2e3, power_min_w=12e3)
+    rules = RuleBasedSettings(on_w=2e3, off_w=1e3, power_min_w=12e3)
     settings = ControllerSettings(rule_based=rules)
     planner = Steady(trip, settings)
     planner.failing = frozenset(range(trip.steps))
     for run in (simulate(trip, planner), drive(trip, RecedingHorizon(trip, planner))):
-        alone = drive(trip, RuleBased(trip, rules=rules))
+        alone = drive(trip, RuleBased(trip, rules=last_rung(rules, trip.vehicle)))
         np.testing.assert_array_equal(run.trajectory.p_eng_w, alone.trajectory.p_eng_w)
 
 
@@ -123,18 +124,21 @@ def test_a_failure_of_the_solver_is_no_decision_but_its_iterations_are_told() ->
     assert run.trajectory.on_share[19] == 0.8
 
 
-def test_two_failures_go_on_from_the_plan_before_and_a_third_starts_cold() -> None:
-    assert FAILURES_FORGIVEN == 2
-    trip = Trip(PART)
-    forgiven, given_up = Failing({30, 31}), Failing({30, 31, 32})
+def test_some_failures_go_on_from_the_plan_before_and_one_more_starts_cold() -> None:
+    trip, first = Trip(PART), 30
+    after = first + FAILURES_FORGIVEN
+    forgiven, given_up = Failing(range(first, after)), Failing(range(first, after + 1))
     controllers = [MhQp(trip, solver=solver) for solver in (forgiven, given_up)]
     rungs = [drive(trip, controller).trajectory.fallback for controller in controllers]
-    assert rungs[0][29:34] == ["", "shifted plan", "shifted plan", "", ""]
+    shifted = ["shifted plan"] * FAILURES_FORGIVEN
+    assert rungs[0][first - 1 : after + 2] == ["", *shifted, "", ""]
     assert all(start is not None for start in forgiven.starts)
-    # three in a row: the next solve starts from nothing, and the rules drive until it has warmed up
-    waiting = ["rule-based"] * (WARM_UP_STEPS - 1)
-    assert rungs[1][29:38] == ["", *["shifted plan"] * 3, *waiting, ""]
-    assert [k for k, start in enumerate(given_up.starts) if start is None] == [33]
+    # one more in a row: the next solve starts from nothing, and until it has warmed up the rules
+    # drive, for as long as the old plan does not
+    waiting = WARM_UP_STEPS + FAILURES_FORGIVEN - PLAN_VALID_STEPS
+    expected = ["", *["shifted plan"] * PLAN_VALID_STEPS, *["rule-based"] * waiting, ""]
+    assert rungs[1][first - 1 : after + 1 + WARM_UP_STEPS] == expected
+    assert [k for k, start in enumerate(given_up.starts) if start is None] == [after + 1]
 
 
 def test_a_planner_that_forgets_starts_cold() -> None:
@@ -236,7 +240,7 @@ def test_a_plan_that_is_not_finite_does_not_drive_and_the_run_says_so() -> None:
 
     run = simulate(PART, Wild)
     assert set(run.trajectory.fallback) == {"rule-based"}
-    assert run.summary()["remarks"] == [
+    assert run.summary()["remarks"][:2] == [
         "wild: no plan at 0 s: the plan is not finite",
         "wild: rule-based drove in 120 of 120 s, first at 0 s",
     ]

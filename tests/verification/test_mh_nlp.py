@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from qpmpc.controllers.receding_horizon import RecedingHorizon
+from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS, RecedingHorizon
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.errors import QpmpcError
@@ -202,10 +202,11 @@ def test_ladder() -> None:
     nlp.solver.solve = (  # type: ignore[method-assign]
         lambda *given, **named: replace(solve(*given, **named), solved=False)
     )
-    rungs = [rung(step) for step in range(1, 7)]
-    assert rungs == ["shifted plan"] * 3 + ["rule-based"] * 3
+    last = PLAN_VALID_STEPS + 3
+    rungs = [rung(step) for step in range(1, last + 1)]
+    assert rungs == ["shifted plan"] * PLAN_VALID_STEPS + ["rule-based"] * 3
     nlp.solver.solve = solve  # type: ignore[method-assign]
-    assert rung(7) == ""
+    assert rung(last + 1) == ""
 
 
 def test_comparison() -> None:

@@ -129,7 +129,7 @@ MUTATIONS = [
     Mutation(
         "heating value in kJ", OptimalLine, "__init__",
         "engine.lhv_j_per_kg * 1e3", "engine.lhv_j_per_kg", (engine_covers_demand, *NLP),
-        ("No battery use", "First command, power", "Predicted SOC", "Planned fuel"),
+        ("No battery use", "First command, power", "Predicted T_cl", "Planned fuel"),
     ),
     Mutation(
         "demand times driveline efficiency", qpmpc.preview.forecast, "demand_w",
@@ -152,12 +152,12 @@ MUTATIONS = [
         "self.demand_w + battery.aux_power_w", "self.demand_w", STAGES,
     ),
     Mutation(
-        "long stages are too short", StageBuilder, "at",
-        "fields[0, n_short:] = duration", "fields[0, n_short:] = 0.9 * duration", STAGES,
+        "long stages are too short", StageBuilder, "_long_fields",
+        "    return fields", "    fields[0] *= 0.9\n    return fields", STAGES,
     ),
     Mutation(
-        "long horizon is a second late", StageBuilder, "at",
-        "np.clip(step + seen, self", "np.clip(step + seen + 1, self", STAGES,
+        "long horizon is a second late", StageBuilder, "_long_fields",
+        "np.clip(step + n_short, self", "np.clip(step + n_short + 1, self", STAGES,
     ),
     Mutation(
         "battery loss of the mean, not mean loss", qpmpc.preview.stages, "_fields",

@@ -14,7 +14,7 @@ from qpmpc.trip import Trip
 from qpmpc.vehicle import load_vehicle, vehicle_names
 from qpmpc.verification.independent.equations import Floats
 
-MOST_PARTS = 3
+MOST_PARTS = 2
 STEEPEST = 0.07
 HILL_M = (200.0, 3000.0)  # shortest and longest wave of the profile
 PLAIN_SHARE, TRUE_SHARE = 0.25, 0.3  # trips without hills, and with a true forecast
