@@ -168,7 +168,7 @@ def test_interrupt_reaches_a_run_that_spends_its_time_in_the_solver(tmp_path, im
         # some packages swallow it while they load
         "import qpmpc.codegen.implementation, qpmpc.simulation\n"
         "from qpmpc.cli import main\n"
-        "threading.Timer(2.0, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
+        "threading.Timer(5.0, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
         "main(['simulate', 'wltc-3b', '--set', 'mh_qp.admm.iterations=5000',"
         f" '--set', 'mh_qp.implementation={implementation}'])\n"
     )
