@@ -71,7 +71,7 @@ def test_optimum(name: str, recordings: list[Recording]) -> None:
             solved += 1
             assert found.status is Status.SOLVED
             residuals = kkt_residuals(recording.structure, qp.data, found.primal, found.dual)
-            # z and slacks are of order 100, that of a bound on fuel which is never met up to 10,000:
+            # z and slacks are of order 100, that of a bound on fuel which is never met 10,000:
             # 1e-8 of a dual, or HiGHS's 1e-8 in P, come out as 1e-6 .. 1e-4
             assert residuals.largest < 1e-4
             assert objective(qp.data, found.primal) == pytest.approx(
