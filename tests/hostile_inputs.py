@@ -9,6 +9,7 @@ from pathlib import Path
 from hypothesis import strategies as st
 
 from qpmpc.cycles import load_cycle
+from qpmpc.faults.models import load_faults
 from qpmpc.registry import split_settings
 from qpmpc.settings import parse_settings
 from qpmpc.vehicle import load_vehicle
@@ -76,6 +77,17 @@ def _shipped(name: str) -> str:
 CYCLE = "time_s,speed_mps,grade\n" + "".join(
     f"{k},{min(k, 40 - k, 12)},{0.01 if k > 20 else 0}\n" for k in range(41)
 )
+FAULTS = """[[fault]]
+kind = "offset"
+signal = "soc"
+at_s = 100
+for_s = 3
+value = 0.05
+
+[[fault]]
+kind = "solver-failure"
+at_s = 200
+"""
 WITH_BASE = "name = 'mine'\nbase = 'prius-nimh'\n[battery]\nsoc_min = 0.45\naux_power_w = 500\n"
 VEHICLE = load_vehicle()
 KEYS = [
@@ -141,6 +153,9 @@ LOADERS: dict[str, Loader] = {
     "vehicle": Loader(
         edited(_shipped("prius-nimh"), "=") | edited(WITH_BASE, "=") | st.binary(max_size=200),
         _file("car.toml", load_vehicle),
+    ),
+    "faults": Loader(
+        edited(FAULTS, "=") | st.binary(max_size=200), _file("faults.toml", load_faults)
     ),
     "settings": Loader(settings_texts(), _load_settings),
 }
