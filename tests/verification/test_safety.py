@@ -3,8 +3,10 @@
 import numpy as np
 
 from qpmpc.trip import Trip
+from qpmpc.verification.checks.safety_checks import FULL_CARS, SEED
 from qpmpc.verification.safety.hostile import hostile_drive
 from qpmpc.verification.safety.random_trips import STEEPEST, drive_one, random_trip
+from qpmpc.verification.safety.seconds import random_vehicle
 
 STEPS = 700
 
@@ -17,6 +19,14 @@ def test_hostile_seconds_c_and_python_agree_and_nothing_avoidable_happens() -> N
     # hostile enough, and yet a plan drives nearly always
     assert {"bad measurement", "bad preview", "bad clock"} <= set(found.flags)
     assert found.planned > 0.9 * STEPS
+
+
+def test_every_random_car_of_the_full_check_is_one() -> None:
+    rng = np.random.default_rng(SEED)
+    cars = [random_vehicle(rng) for _ in range(FULL_CARS)]
+    # the least coolant and the largest radiator are drawn, but not together
+    assert min(car.thermal.heat_capacity_j_per_k for car in cars) < 22e3
+    assert max(car.thermal.radiator_w_per_k for car in cars) == 900.0
 
 
 def test_random_trips_are_seeded_and_as_described() -> None:

@@ -1,14 +1,27 @@
 """Random seconds and cars, most of them where limits bind."""
 
+from contextlib import suppress
+
 import numpy as np
 
+from qpmpc.errors import InputError
 from qpmpc.vehicle import Vehicle, load_vehicle, vehicle_names
 from qpmpc.verification.independent.equations import Floats
 from qpmpc.verification.safety.every_command import Seconds
 
 
 def random_vehicle(rng: np.random.Generator) -> Vehicle:
-    """Return a shipped car in extreme weather, with another coolant, engine and auxiliaries."""
+    """Return a shipped car in extreme weather, with another coolant, engine and auxiliaries.
+
+    Drawn again where it is refused: so little coolant would swing within a second beside the
+    largest radiator.
+    """
+    while True:
+        with suppress(InputError):
+            return _drawn(rng)
+
+
+def _drawn(rng: np.random.Generator) -> Vehicle:
     return load_vehicle(str(rng.choice(vehicle_names()))).with_settings(
         {
             "thermal.t_amb_degc": rng.uniform(-40.0, 45.0),
