@@ -216,7 +216,7 @@ def _plant(vehicle: Vehicle, line: OptimalLine, maps: BatteryMaps) -> dict[str, 
     return {
         "fuel_step_w": float(line.power_w[1] - line.power_w[0]),  # grid of fuel_g_per_s, from 0
         **{f"cold_{name}": float(value) for name, value in cold.model_dump().items()},
-        **{f"can_{name}": value for name, value in asdict(Capability.of(vehicle)).items()},
+        **{f"can_{name}": value for name, value in asdict(Capability.of(vehicle, line)).items()},
         "charge_c": maps.charge_c,
         "start_fuel_g": vehicle.engine.start_fuel_g,
         "aux_power_w": vehicle.battery.aux_power_w,

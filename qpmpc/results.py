@@ -123,7 +123,7 @@ class Run:
         """Excess over the limits, second by second."""
         return excess_of(self.vehicle, self.trajectory)
 
-    @property
+    @cached_property
     def not_comparable(self) -> list[str]:
         """Why the run's fuel cannot be compared with that of others; empty if it can."""
         found = []

@@ -109,7 +109,7 @@ class Trip:
     def preview(self, horizon: HorizonSettings) -> CheckedPreview:
         """Return the trip ahead, cut into stages at any second and checked."""
         source = StageBuilder(self.vehicle, self.truth, self.forecast, horizon)
-        return CheckedPreview(source, self.vehicle)
+        return CheckedPreview(source, self.plant)
 
     def with_forecast(self, forecast: Trace | Cycle | None) -> "Trip":
         """Return the same trip with another forecast; the truth if None."""

@@ -78,7 +78,7 @@ static void predict(const mpc_watch *watch, mpc_real *soc, mpc_real *t_cl_degc)
     const mpc_real current_a = mpc_map_current_a(good->soc, p_bat_w);
     const mpc_real fuel_w = mpc_map_cold_factor(good->t_cl_degc) * mpc_par.lhv_j_per_g
                             * mpc_map_fuel_g_per_s(watch->command_w);
-    const mpc_real engine_w = (REAL(1.0) - mpc_par.exhaust_share) * (fuel_w - watch->command_w);
+    const mpc_real engine_w = heat_engine_w(fuel_w, watch->command_w);
     const mpc_real heat_w = ((watch->command_on != 0) ? engine_w : REAL(0.0))
                             - heat_cooling_w(good->t_cl_degc, good->speed_mps);
     *soc = real_clip(good->soc - (current_a / mpc_par.charge_c), REAL(0.0), REAL(1.0));

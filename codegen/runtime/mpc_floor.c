@@ -21,8 +21,7 @@ static mpc_real largest_gain_k(const mpc_stage_road *road, mpc_real room, mpc_re
                               + real_min(charged_w, mpc_par.battery_charge_max_w);
     const mpc_real power_w = real_clip(wanted_w, mpc_par.engine_min_w, mpc_par.engine_max_w);
     const mpc_real fuel_w = factor * mpc_map_fuel_g_per_s(power_w);
-    return (road->duration_s * (REAL(1.0) - mpc_par.exhaust_share) * (fuel_w - power_w))
-           / mpc_par.heat_capacity_j_per_k;
+    return (road->duration_s * heat_engine_w(fuel_w, power_w)) / mpc_par.heat_capacity_j_per_k;
 }
 
 void mpc_floor_find(mpc_state *state, mpc_real soc)

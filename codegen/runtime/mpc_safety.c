@@ -22,7 +22,6 @@ typedef struct {
 
 /* Heat of the running engine: (1 - x) (LHV (alpha f(P) + start) - P). */
 typedef struct {
-    mpc_real share;
     mpc_real factor;
     mpc_real start_w;
 } engine_heat;
@@ -73,8 +72,8 @@ static interval of_soc(const mpc_measured *seen, mpc_real margin)
 static mpc_real heat_at(const engine_heat *heat, int32_t i)
 {
     return heat->start_w
-           + (heat->share
-              * ((heat->factor * mpc_par.fuel_g_per_s[i]) - ((mpc_real)i * mpc_par.fuel_step_w)));
+           + heat_engine_w(heat->factor * mpc_par.fuel_g_per_s[i],
+                           (mpc_real)i * mpc_par.fuel_step_w);
 }
 
 /* Engine power that gives this heat; heat grows with power. Always the same number of steps. */
@@ -131,10 +130,9 @@ static int32_t better(int32_t wish, const mpc_real *on, const mpc_real *off)
 
 mpc_command mpc_safety_admissible(mpc_command wish, const mpc_measured *seen)
 {
-    const mpc_real share = REAL(1.0) - mpc_par.exhaust_share;
     const mpc_real start_g = (seen->engine_on != 0) ? REAL(0.0) : mpc_par.start_fuel_g;
-    const engine_heat heat = {share, mpc_map_cold_factor(seen->t_cl_degc) * mpc_par.lhv_j_per_g,
-                              share * mpc_par.lhv_j_per_g * start_g};
+    const engine_heat heat = {mpc_map_cold_factor(seen->t_cl_degc) * mpc_par.lhv_j_per_g,
+                              heat_engine_w(mpc_par.lhv_j_per_g * start_g, REAL(0.0))};
     interval running = {mpc_par.engine_min_w, mpc_par.engine_max_w};
     mpc_real on[2 * LIMITS];
     mpc_real off[2 * LIMITS];
@@ -154,7 +152,7 @@ mpc_command mpc_safety_admissible(mpc_command wish, const mpc_measured *seen)
                                   power_for_heat_w(&heat, warmth.high)};
         running = narrowed(running, by_heat);
         const mpc_real fuel = mpc_map_fuel_g_per_s(running.low);
-        const mpc_real made_w = heat.start_w + (share * ((heat.factor * fuel) - running.low));
+        const mpc_real made_w = heat.start_w + heat_engine_w(heat.factor * fuel, running.low);
         /* within what the inverse resolves, it is kept */
         const int32_t kept = ((by_heat.low <= running.low) && (running.low <= by_heat.high)) ? 1
                                                                                              : 0;

@@ -8,7 +8,7 @@ from enum import IntFlag
 from qpmpc.trip import Observation
 from qpmpc.vehicle.capability import Capability
 from qpmpc.vehicle.engine import alpha_at
-from qpmpc.vehicle.heat import cooling_w
+from qpmpc.vehicle.heat import cooling_w, engine_w
 from qpmpc.vehicle.plant import Command, Plant
 
 LONG_AGO_S = 1_000_000  # since the last good measurement: none yet
@@ -48,7 +48,7 @@ class InputMonitor:
 
     def __init__(self, plant: Plant) -> None:
         self._plant = plant
-        self._can = Capability.of(plant.vehicle)
+        self._can = Capability.of(plant.vehicle, plant.line)
         self.forget()
 
     def forget(self) -> None:
@@ -119,7 +119,7 @@ class InputMonitor:
         if command.engine_on:
             fuel_w = alpha_at(vehicle.cold_engine, good.t_cl_degc) * vehicle.engine.lhv_j_per_g
             fuel_w *= self._plant.line.fuel.at(command.p_eng_w)
-            heat_w += (1.0 - thermal.exhaust_share) * (fuel_w - command.p_eng_w)
+            heat_w += engine_w(thermal, fuel_w, command.p_eng_w)
         t_cl_degc = good.t_cl_degc + h * heat_w / thermal.heat_capacity_j_per_k
         return min(max(soc, 0.0), 1.0), min(
             max(t_cl_degc, self._can.coldest_degc), self._can.hottest_degc

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from qpmpc.trip import Observation
 from qpmpc.vehicle.engine import alpha_at
-from qpmpc.vehicle.heat import cooling_w
+from qpmpc.vehicle.heat import cooling_w, engine_w
 from qpmpc.vehicle.plant import Command, Plant
 
 # Kept from the limits where that is possible: rounding, in single precision too, stays inside.
@@ -128,20 +128,20 @@ class _EngineHeat:
         vehicle, plant = layer._vehicle, layer._plant
         engine = vehicle.engine
         self._factor = alpha_at(vehicle.cold_engine, seen.t_cl_degc) * engine.lhv_j_per_g
-        self._share = 1.0 - vehicle.thermal.exhaust_share
+        self._thermal = vehicle.thermal
         starting_g_per_s = 0.0 if seen.engine_on else engine.start_fuel_g / plant.step_s
-        self._start_w = self._share * engine.lhv_j_per_g * starting_g_per_s
+        self._start_w = engine_w(vehicle.thermal, engine.lhv_j_per_g * starting_g_per_s, 0.0)
         self._fuel, self._fuel_g_per_s = plant.line.fuel, layer._fuel_g_per_s
         self._line_w = layer._power_w
 
     def of(self, p_eng_w: float) -> float:
         """Heat, W, at an engine power."""
         fuel_w = self._factor * self._fuel.at(p_eng_w)
-        return self._start_w + self._share * (fuel_w - p_eng_w)
+        return self._start_w + engine_w(self._thermal, fuel_w, p_eng_w)
 
     def _at(self, i: int) -> float:
         fuel_w = self._factor * self._fuel_g_per_s[i]
-        return self._start_w + self._share * (fuel_w - self._line_w[i])
+        return self._start_w + engine_w(self._thermal, fuel_w, self._line_w[i])
 
     def power_w(self, heat_w: float) -> float:
         """Engine power that gives this heat; infinite where none does."""

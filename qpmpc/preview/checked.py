@@ -12,7 +12,7 @@ from qpmpc.errors import QpmpcError
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.preview.stages import Preview, StageBuilder, Stages
 from qpmpc.vehicle.capability import Capability
-from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.vehicle.plant import Plant
 
 LONGEST_STAGE_S = 1e5
 NEWS = 0.2  # share of a preview that may change from one second to the next
@@ -38,7 +38,7 @@ class CheckedPreview:
     Parameters
     ----------
     source : cuts the trip into stages
-    vehicle : parameters
+    plant : of the car; its state is never touched
     receive : returns the preview of a second; that of the source if None
 
     Attributes
@@ -49,12 +49,12 @@ class CheckedPreview:
     def __init__(
         self,
         source: StageBuilder,
-        vehicle: Vehicle,
+        plant: Plant,
         receive: Callable[[int], Preview] | None = None,
     ) -> None:
         self.source, self.was_bad = source, False
         self.receive = receive or source.preview
-        self._can = Capability.of(vehicle)
+        self._can = Capability.of(plant.vehicle, plant.line)
         self._last: Stages | None = None
         self._last_step = 0
         self._received: Preview | None = None

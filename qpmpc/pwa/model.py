@@ -48,12 +48,14 @@ class PwaModel:
     battery : terminal power W -> internal power W at the trip's initial SOC
     alpha : coolant degC -> cold multiplier
     battery_energy_j : energy of a unit of SOC at the trip's initial SOC
+    line : the optimal line that `fuel` fits
     """
 
     fuel: PwaFit
     battery: PwaFit
     alpha: PwaFit
     battery_energy_j: float
+    line: OptimalLine
 
     @classmethod
     def of(cls, vehicle: Vehicle, tolerances: PwaTolerances | None = None) -> "PwaModel":
@@ -79,6 +81,7 @@ class PwaModel:
                 temperature, multiplier, tol.alpha, interpolation_error=_curvature_error(multiplier)
             ),
             battery_energy_j=maps.energy_j(soc),
+            line=line,
         )
 
 

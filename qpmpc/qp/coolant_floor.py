@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from qpmpc.preview.stages import Stages
 from qpmpc.vehicle.engine import OptimalLine, alpha_at
-from qpmpc.vehicle.heat import cooling_w
+from qpmpc.vehicle.heat import cooling_w, engine_w
 from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
@@ -36,14 +36,16 @@ class CoolantFloor:
 
     Parameters
     ----------
-    vehicle : parameters
+    vehicle, line : parameters, and the optimal line of the engine
     battery_energy_j : energy of a unit of SOC
     least_degc : floor where the trip ahead asks for nothing more
     """
 
-    def __init__(self, vehicle: Vehicle, battery_energy_j: float, least_degc: float) -> None:
+    def __init__(
+        self, vehicle: Vehicle, line: OptimalLine, battery_energy_j: float, least_degc: float
+    ) -> None:
         self._vehicle, self._energy_j, self._least = vehicle, battery_energy_j, least_degc
-        self._line = OptimalLine(vehicle.engine)
+        self._line = line
         thermal = vehicle.thermal
         self._most = max(0.5 * (thermal.t_cl_min_degc + thermal.t_cl_max_degc), least_degc)
         self._factor = alpha_at(vehicle.cold_engine, thermal.t_cl_min_degc)
@@ -66,7 +68,7 @@ class CoolantFloor:
             power = max(net, battery.aux_power_w) + min(charged, battery.power_charge_max_w)
             power = min(max(power, engine.power_min_w), engine.power_max_w)
             fuel_w = self._factor * self._line.fuel.at(power)
-            gained_k.append(h * (1.0 - thermal.exhaust_share) * (fuel_w - power) / per_k)
+            gained_k.append(h * engine_w(thermal, fuel_w, power) / per_k)
             room = min(max(room + h * off / self._energy_j, 0.0), widest)
         floors = []
         floor = self._least

@@ -55,7 +55,7 @@ class Quantities:
         self, parameters: Mapping[str, float], vehicle: Vehicle, model: PwaModel, stages: int
     ) -> None:
         thermal, least = vehicle.thermal, parameters["t_min_degc"]
-        self._floor = CoolantFloor(vehicle, parameters["battery_energy_j"], least)
+        self._floor = CoolantFloor(vehicle, model.line, parameters["battery_energy_j"], least)
         losses = heat.in_arithmetic(min=np.minimum, max=np.maximum)
         is_last = np.zeros((stages, 1))
         is_last[-1] = 1.0

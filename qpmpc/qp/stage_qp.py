@@ -116,7 +116,9 @@ def qp_parameters(
         "terminal_soc_low": soc_low,
         "terminal_soc_high": soc_high,
         "soc_penalty_g": settings.soc_penalty_g,
-        "t_min_degc": thermal.t_cl_min_degc + settings.t_cl_margin_k + heat_reserve_k(vehicle),
+        "t_min_degc": thermal.t_cl_min_degc
+        + settings.t_cl_margin_k
+        + heat_reserve_k(vehicle, model.line),
         "t_max_degc": thermal.t_cl_max_degc - T_CL_MAX_MARGIN_K,
         "slack_g_per_k": settings.slack_g_per_k,
         "regularisation": settings.regularisation,

@@ -7,7 +7,7 @@ import numpy as np
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.demand import GRAVITY_MPS2
 from qpmpc.vehicle.engine import OptimalLine, alpha_at
-from qpmpc.vehicle.heat import cooling_w
+from qpmpc.vehicle.heat import cooling_w, engine_w
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.plant import BOILING_DEGC
 
@@ -46,8 +46,8 @@ class Capability:
     internal_max_w: float
 
     @classmethod
-    def of(cls, vehicle: Vehicle) -> "Capability":
-        """Compute the bounds of a car."""
+    def of(cls, vehicle: Vehicle, line: OptimalLine) -> "Capability":
+        """Compute the bounds of a car with this optimal line."""
         battery, engine = vehicle.battery, vehicle.engine
         maps = BatteryMaps(battery)
         limits_w = (battery.power_discharge_max_w, -battery.power_charge_max_w)
@@ -62,7 +62,7 @@ class Capability:
             hottest_degc=BOILING_DEGC,
             coldest_degc=COLDEST_MEASURED_DEGC,
             soc_per_s=current / maps.charge_c,
-            t_cl_k_per_s=_fastest_k_per_s(vehicle, fastest),
+            t_cl_k_per_s=_fastest_k_per_s(vehicle, line, fastest),
             demand_min_w=-(GRIP * weight_n * fastest) * vehicle.chassis.eta_regen - ROUNDING_W,
             demand_max_w=STRONGEST * most_w,
             speed_max_mps=fastest,
@@ -82,12 +82,12 @@ def _level_speed_mps(vehicle: Vehicle, power_w: float) -> float:
     return float(speed[load_w <= power_w].max())
 
 
-def _fastest_k_per_s(vehicle: Vehicle, speed_mps: float) -> float:
+def _fastest_k_per_s(vehicle: Vehicle, line: OptimalLine, speed_mps: float) -> float:
     """Largest change of the coolant: cold engine at full power, or boiling and engine off."""
     engine, thermal = vehicle.engine, vehicle.thermal
     factor = alpha_at(vehicle.cold_engine, COLDEST_MEASURED_DEGC) * engine.lhv_j_per_g
-    fuel_g = OptimalLine(engine).fuel_g_per_s[-1] + engine.start_fuel_g
-    heating_w = (1.0 - thermal.exhaust_share) * (factor * float(fuel_g) - engine.power_max_w)
+    fuel_g = float(line.fuel_g_per_s[-1]) + engine.start_fuel_g
+    heating_w = engine_w(thermal, factor * fuel_g, engine.power_max_w)
     warming_w = cooling_w(thermal, COLDEST_MEASURED_DEGC, speed_mps)  # negative
     cooling = cooling_w(thermal, BOILING_DEGC, speed_mps)
     return max(heating_w - min(warming_w, 0.0), cooling) / thermal.heat_capacity_j_per_k

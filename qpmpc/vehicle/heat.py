@@ -1,4 +1,4 @@
-"""Heat that leaves the coolant, paper eq. (3): one text for plant, QP, generated C and DP.
+"""Heat into and out of the coolant, paper eq. (3): one text for plant, QP, generated C and DP.
 
 Each function is one expression in the subset of `qpmpc.qp.expressions`, so that it can be rendered
 in other arithmetic (`in_arithmetic`) and in C (`qpmpc.codegen.rows.c_text`). `th` can be any object
@@ -48,7 +48,19 @@ def cooling_w(th: Thermal, t_cl_degc: float, speed_mps: float) -> float:
     return air_w(th, t_cl_degc, speed_mps) + radiator_w(th, t_cl_degc) + cabin_w(th, t_cl_degc)
 
 
-FUNCTIONS: tuple[Callable[..., float], ...] = (ua_w_per_k, air_w, radiator_w, cabin_w, cooling_w)
+def engine_w(th: Thermal, fuel_w: float, p_eng_w: float) -> float:
+    """Heat of the engine into the coolant, (1 - x) (Q_fuel - P_eng): the rest is exhaust."""
+    return (1.0 - th.exhaust_share) * (fuel_w - p_eng_w)
+
+
+FUNCTIONS: tuple[Callable[..., float], ...] = (
+    ua_w_per_k,
+    air_w,
+    radiator_w,
+    cabin_w,
+    cooling_w,
+    engine_w,
+)
 
 
 def in_arithmetic(**functions: Callable[..., Any]) -> dict[str, Any]:

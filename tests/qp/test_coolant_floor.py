@@ -40,7 +40,7 @@ def descent(level_s: int = 400, down_s: int = 900) -> Cycle:
 def floor_at(car, step: int, soc: float) -> np.ndarray:
     model = PwaModel.of(car)
     numbers = qp_parameters(car, model, QpSettings(), ScalingSettings())
-    floor = CoolantFloor(car, numbers["battery_energy_j"], numbers["t_min_degc"])
+    floor = CoolantFloor(car, model.line, numbers["battery_energy_j"], numbers["t_min_degc"])
     return floor.at(Trip(descent(), car).preview(OF_QP.horizon).source.at(step), soc)
 
 

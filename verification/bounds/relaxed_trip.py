@@ -62,6 +62,7 @@ def relaxed_trip(cycle: Cycle, vehicle: Vehicle) -> RelaxedTrip:
         fit.battery.under_estimator(),
         fit.alpha.under_estimator(),
         fit.battery_energy_j,
+        fit.line,
     )
     qp = StageQp(vehicle, under, preview.count, SETTINGS, ScalingSettings())
     stages, start = preview.at(0), vehicle.trip.t_cl_init_degc

@@ -50,7 +50,8 @@ class SmoothMaps:
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
-        line, maps = OptimalLine(vehicle.engine), BatteryMaps(vehicle.battery)
+        self.line = line = OptimalLine(vehicle.engine)
+        maps = BatteryMaps(vehicle.battery)
         count = int(np.ceil(line.power_max_w / FUEL_STEP_W)) + 1
         power = np.linspace(0.0, line.power_max_w, count)
         self._fuel = RoundedTable(power, line.fuel(power), FUEL_CORNER_W)

@@ -133,8 +133,8 @@ class NlpProblem:
         self._row_lower, self._row_upper = self._row_bounds()
         energy_j = BatteryMaps(self.vehicle.battery).energy_j(trip.soc_init)
         least = self.vehicle.thermal.t_cl_min_degc + self.settings.t_cl_margin_k
-        least += heat_reserve_k(self.vehicle)
-        self._floor = CoolantFloor(self.vehicle, energy_j, least)
+        least += heat_reserve_k(self.vehicle, self._maps.line)
+        self._floor = CoolantFloor(self.vehicle, self._maps.line, energy_j, least)
 
     def _stage(self, thermostat_steps: int) -> Any:
         """One stage: (SOC and T before, variables, road) -> fuel g, SOC surplus, coolant gap."""
