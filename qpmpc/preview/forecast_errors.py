@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from qpmpc.cycles import Cycle
+from qpmpc.cycles.standstill import phases
 from qpmpc.errors import InputError
 from qpmpc.preview.forecast import Trace
 from qpmpc.vehicle.parameters import Vehicle
@@ -70,7 +71,7 @@ def shift(cycle: Cycle, rng: np.random.Generator) -> Cycle:
 def stop_durations(cycle: Cycle, rng: np.random.Generator) -> Cycle:
     """Each stop longer or shorter by its own lognormal factor, spread 0.5, at least 1 s."""
     pieces = []
-    for start, end, standing in _phases(cycle.speed_mps):
+    for start, end, standing in phases(cycle.speed_mps):
         if standing:
             factor = np.exp(STOP_SPREAD * rng.standard_normal())
             pieces.append(np.full(max(round((end - start) * factor), 1), start))
@@ -86,7 +87,7 @@ def another_day(cycle: Cycle, rng: np.random.Generator) -> Cycle:
     A micro-trip is a drive and the stop after it. A trip without stops is a single micro-trip and
     stays unchanged.
     """
-    driving = [start for start, _, standing in _phases(cycle.speed_mps) if not standing]
+    driving = [start for start, _, standing in phases(cycle.speed_mps) if not standing]
     if not driving:
         return cycle
     bounds = [*driving, len(cycle.speed_mps)]
@@ -131,13 +132,6 @@ def forecast(cycle: Cycle, vehicle: Vehicle, model: str, seed: int) -> Trace:
         raise InputError(f"unknown forecast error {model!r}: use one of {', '.join(MODELS)}")
     rng = np.random.default_rng([list(MODELS).index(model), seed])
     return Trace.of(MODELS[model](cycle, rng), vehicle)
-
-
-def _phases(speed_mps: Floats) -> list[tuple[int, int, bool]]:
-    """Sequences of points that stand or drive: (first, one after the last, standing)."""
-    standing = speed_mps <= 0.0
-    edges = [0, *(np.flatnonzero(np.diff(standing)) + 1).tolist(), len(standing)]
-    return [(a, b, bool(standing[a])) for a, b in pairwise(edges)]
 
 
 def _at(cycle: Cycle, index: NDArray[np.intp]) -> Cycle:

@@ -1,0 +1,105 @@
+"""What a trip is composed of: roads in order, and the seconds on each."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpmpc.cycles.cycle import Floats
+from qpmpc.cycles.trips.draws import Draws
+from qpmpc.cycles.trips.micro_trips import CITY, MOTORWAY, RURAL, SUBURB, draw_micro_trip
+from qpmpc.cycles.trips.motorway import SHORTEST_S, motorway
+
+ROADS = (CITY, SUBURB, RURAL, MOTORWAY)
+
+TYPES = ("city", "suburb", "mixed", "motorway")
+SHARES = (  # of the types, by the duration below which they hold
+    (300.0, (0.60, 0.40, 0.00, 0.00)),
+    (900.0, (0.40, 0.30, 0.30, 0.00)),
+    (2400.0, (0.20, 0.20, 0.40, 0.20)),
+    (np.inf, (0.10, 0.10, 0.40, 0.40)),
+)
+"""Short trips are local, long ones are not: assumed."""
+
+STOP_MEDIAN_S, STOP_SPREAD = {CITY: 14.0, SUBURB: 11.0, RURAL: 9.0, MOTORWAY: 9.0}, 0.8
+STOP_S = (2, 120)
+LEAST_S = 24  # what is left of a part is not filled below it
+RURAL_FROM_S, MOTORWAY_FROM_S = 180.0, 240.0
+MOTORWAY_PART_S = (1200.0, 3000.0)  # between stops, on a long way
+
+
+class Wanted(NamedTuple):
+    """A trip on a level road: speed at whole seconds, and the number of its road in `ROADS`."""
+
+    speed_mps: Floats
+    road: NDArray[np.intp]
+
+
+def trip_type(duration_s: float, quantile: float) -> str:
+    """Type at a quantile, 0..1, of those of this duration."""
+    shares = next(shares for below, shares in SHARES if duration_s < below)
+    return TYPES[int(np.searchsorted(np.cumsum(shares)[:-1], quantile, side="right"))]
+
+
+def compose(draws: Draws, kind: str, duration_s: int) -> Wanted:
+    """Draw the motion of a trip of exactly this duration, at rest at both ends."""
+    speed: list[Floats] = [np.zeros(1)]
+    road: list[NDArray[np.intp]] = [np.zeros(1, dtype=np.intp)]
+    parts = _parts(draws, kind, duration_s)
+    road[0][:] = ROADS.index(parts[0][0])
+
+    def add(piece: Floats, where: str) -> int:
+        speed.append(piece)
+        road.append(np.full(len(piece), ROADS.index(where)))
+        return len(piece)
+
+    left = duration_s - add(np.zeros(2 + draws.integer(8)), parts[0][0])
+    for number, (where, seconds) in enumerate(parts):
+        is_last = number == len(parts) - 1
+        budget = left if is_last else min(round(seconds), left)
+        while budget >= LEAST_S:
+            piece = _piece(draws, where, budget)
+            if piece is None:
+                where = {RURAL: SUBURB, SUBURB: CITY}.get(where, "") if is_last else ""
+                if not where:
+                    break
+                continue
+            used = add(piece[1:], where)
+            stop = round(draws.lognormal(STOP_MEDIAN_S[where], STOP_SPREAD))
+            stop = min(max(stop, STOP_S[0]), STOP_S[1], left - used)
+            used += add(np.zeros(stop), where)
+            budget, left = budget - used, left - used
+    add(np.zeros(left), where)
+    return Wanted(np.concatenate(speed), np.concatenate(road))
+
+
+def _piece(draws: Draws, where: str, budget_s: int) -> Floats | None:
+    longest = budget_s - STOP_S[0]
+    if where != MOTORWAY:
+        return draw_micro_trip(draws, where, longest)
+    seconds = min(longest, round(draws.uniform(*MOTORWAY_PART_S)))
+    return motorway(draws, seconds) if seconds >= SHORTEST_S else None
+
+
+def _parts(draws: Draws, kind: str, duration_s: float) -> list[tuple[str, float]]:
+    """Roads in order with the seconds on each; the last takes what the others leave."""
+    if kind == "city":
+        return [(CITY, duration_s)]
+    if kind == "suburb":
+        ways = [(SUBURB, 0.5), (CITY, 0.2), (SUBURB, 0.3)] if duration_s > 600 else [(SUBURB, 1.0)]
+    elif kind == "mixed":
+        fast = draws.uniform(0.3, 0.6)
+        road = MOTORWAY if fast * duration_s > MOTORWAY_FROM_S and draws.uniform() < 0.5 else RURAL
+        near = draws.uniform(0.3, 0.7) * (1.0 - fast)
+        ways = [(CITY, near * 0.5), (SUBURB, near * 0.5), (road, fast), (CITY, 0.0)]
+        if draws.uniform() < 0.5:  # home instead of to work
+            ways = [(SUBURB, near), (road, fast), (SUBURB, 0.0)]
+    else:
+        fast = draws.uniform(0.6, 0.85)
+        country = draws.uniform(0.0, 0.3) * (1.0 - fast)
+        ways = [(SUBURB, 0.4 * (1.0 - fast)), (MOTORWAY, fast), (RURAL, country), (SUBURB, 0.0)]
+    return [
+        (where, share * duration_s)
+        for where, share in ways
+        if where != RURAL or share * duration_s > RURAL_FROM_S
+    ]

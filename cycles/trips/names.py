@@ -1,0 +1,88 @@
+"""Names of trips: ``train-017``, ``judge-017``, ``random-5``, ``random-5-600s``."""
+
+import re
+from typing import NamedTuple
+
+from qpmpc.errors import InputError
+from qpmpc.problems import shown_value
+
+SETS: dict[str, int] = {"train": 200, "judge": 200}
+"""Number of trips in each set."""
+
+SHORTEST_S, LONGEST_S = 120, 7200
+SEEDS = 2**31
+
+ALLOWED = (
+    ", ".join(f"{name}-000 .. {name}-{size - 1:03d}" for name, size in SETS.items())
+    + ", random-SEED[-SECONDSs]"
+)
+"""The names of all trips, for messages."""
+
+_OF_SET = re.compile(rf"({'|'.join(SETS)})-([0-9]{{3}})")
+_RANDOM = re.compile(r"random-(0|[1-9][0-9]{0,9})(?:-([1-9][0-9]{0,4})s)?")
+
+
+class TripName(NamedTuple):
+    """A name taken apart.
+
+    Attributes
+    ----------
+    group : ``train``, ``judge`` or ``random``
+    number : of the trip in its set, or the seed
+    duration_s : where the name has one
+    """
+
+    group: str
+    number: int
+    duration_s: int | None
+
+
+def set_names(name: str) -> tuple[str, ...]:
+    """Names of the trips of a set.
+
+    Raises
+    ------
+    InputError
+        If there is no such set.
+    """
+    if name not in SETS:
+        raise InputError(f"unknown set of trips {shown_value(name)}: use one of {', '.join(SETS)}")
+    return tuple(f"{name}-{i:03d}" for i in range(SETS[name]))
+
+
+def is_trip(name: str) -> bool:
+    """Whether `make_trip` makes a trip of this name."""
+    return _parsed(name) is not None
+
+
+def looks_like_trip(name: str) -> bool:
+    """Whether a name begins like that of a trip, right or wrong."""
+    return name.startswith(tuple(f"{group}-" for group in (*SETS, "random")))
+
+
+def parse_name(name: str) -> TripName:
+    """Take a name apart.
+
+    Raises
+    ------
+    InputError
+        If it is not the name of a trip; the message says what is allowed.
+    """
+    found = _parsed(name)
+    if found is None:
+        raise InputError(
+            f"unknown trip {shown_value(name)}: use one of {ALLOWED}; "
+            f"SEED 0 .. {SEEDS - 1}, SECONDS {SHORTEST_S} .. {LONGEST_S}, no leading zeros"
+        )
+    return found
+
+
+def _parsed(name: str) -> TripName | None:
+    if match := _OF_SET.fullmatch(name):
+        number = int(match[2])
+        return TripName(match[1], number, None) if number < SETS[match[1]] else None
+    if match := _RANDOM.fullmatch(name):
+        seed, duration_s = int(match[1]), int(match[2]) if match[2] else None
+        if seed < SEEDS and (duration_s is None or SHORTEST_S <= duration_s <= LONGEST_S):
+            return TripName("random", seed, duration_s)
+    return None
