@@ -13,8 +13,9 @@ from time import monotonic
 from types import TracebackType
 from typing import Any, Self
 
+from qpmpc.codegen.c_compiler import CodegenError
 from qpmpc.codegen.generate import Algorithm, Precision, generate
-from qpmpc.codegen.host_library import CodegenError, structures
+from qpmpc.codegen.host_library import structures
 from qpmpc.codegen.values import Values
 
 COMPILER, SIZE, NM, QEMU = (

@@ -1,8 +1,8 @@
 """Generator: the C project of one controller, from templates and the runtime's own files."""
 
 from collections.abc import Callable
+from functools import cache
 from importlib import resources
-from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -98,23 +98,14 @@ def project_files(
     one_of(precision, PRECISIONS, "precision")
     one_of(algorithm, ALGORITHMS, "algorithm")
     checked_prefix(prefix)
-    root = resources.files("qpmpc.codegen")
-    files = {p.name: p.read_text("utf-8") for p in _sorted(root / "runtime")}
-    files |= rows_files(values.scalars, algorithm)
+    files = _texts("runtime") | rows_files(tuple(values.scalars), algorithm)
     of_osqp: dict[str, str] = {}
     if algorithm == "osqp":
         del files["mpc_admm.c"], files["mpc_admm.h"]
-        files |= {p.name: p.read_text("utf-8") for p in _sorted(root / "osqp_adapter")}
+        files |= _texts("osqp_adapter")
         of_osqp = osqp_files(values, precision)
     if target == "cortex-m7":
-        files |= {p.name: p.read_text("utf-8") for p in _sorted(root / "cortex_m7")}
-    environment = Environment(
-        loader=FunctionLoader(lambda name: (root / "templates" / name).read_text("utf-8")),
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-        trim_blocks=False,
-        autoescape=False,
-    )
+        files |= _texts("cortex_m7")
     context = _context(values, target, precision, algorithm)
     templates = {
         "mpc_config.h": "mpc_config.h.j2",
@@ -130,7 +121,7 @@ def project_files(
     context["sources"] = sorted(n for n in [*files, "mpc_data.c"] if n.endswith(".c"))
     context["osqp_sources"] = [name for name in of_osqp if name.endswith(".c")]
     for output, template in templates.items():
-        files[output] = environment.get_template(template).render(context)
+        files[output] = _environment().get_template(template).render(context)
     files |= example_files(target)
     return with_prefix(dict(sorted((files | of_osqp).items())), prefix)
 
@@ -149,8 +140,24 @@ def one_of(name: str, names: tuple[Name, ...], what: str) -> Name:
     raise InputError(f"unknown {what} {name!r}: use one of {', '.join(names)}")
 
 
-def _sorted(folder: Traversable) -> list[Traversable]:
-    return sorted((p for p in folder.iterdir() if p.is_file()), key=lambda p: p.name)
+@cache
+def _texts(folder: str) -> dict[str, str]:
+    """Return the files of a folder of this package, by name; not to be changed."""
+    inner = (resources.files("qpmpc.codegen") / folder).iterdir()
+    paths = sorted((path for path in inner if path.is_file()), key=lambda path: path.name)
+    return {path.name: path.read_text("utf-8") for path in paths}
+
+
+@cache
+def _environment() -> Environment:
+    """Return what compiles the templates, each once."""
+    return Environment(
+        loader=FunctionLoader(lambda name: _texts("templates")[name]),
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+        trim_blocks=False,
+        autoescape=False,
+    )
 
 
 def _count_or(literal: Callable[[float], str], value: float) -> str:

@@ -2,22 +2,29 @@
 
 import ctypes
 import hashlib
-import os
 import platform
-import shutil
-import subprocess
-import tempfile
+from _ctypes import dlclose
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
+from weakref import finalize
 
+from qpmpc.codegen.c_compiler import (
+    DATA,
+    FLAGS,
+    NEEDS_NONE,
+    RELOCATABLE,
+    CodegenError,
+    common_object,
+    compiler,
+    library_of,
+    version,
+)
 from qpmpc.codegen.examples import is_example
 from qpmpc.codegen.generate import Algorithm, Precision, project_files
-from qpmpc.codegen.library_cache import Kept, kept_library
+from qpmpc.codegen.library_cache import Kept, kept_file
 from qpmpc.codegen.values import Values
-from qpmpc.errors import QpmpcError
-from qpmpc.files import write_text
 from qpmpc.qp.rows import VARS
 from qpmpc.remarks import say_once
 
@@ -36,28 +43,13 @@ _ABI_NAMES = (
     "offset of short_count",
     "offset of engine_on",
 )
-# -w: a new compiler's warnings must not stop a user; the tests check warnings
-FLAGS = (
-    "-O3 -std=c99 -w -ffp-contract=off -fPIC -shared -Wl,-Bsymbolic "
-    "-Iosqp -Iosqp/inc/public -Iosqp/inc/private"
-)
-NEEDS_NONE = "mh_qp.implementation=python needs none"
 _STATE = 4
 # Before mpc_step.c in a library whose solver fails where it is told to.
 MAY_FAIL = """#include <stdint.h>
 int32_t mpc_solver_may_succeed = 1;
 #define MPC_SOLVER_MAY_SUCCEED mpc_solver_may_succeed
 """
-
-
-class CodegenError(QpmpcError):
-    """A generated controller could not be built or does not fit its caller."""
-
-
-def compiler() -> str | None:
-    """Return the C compiler of this machine: $CC, cc, gcc or clang; None if there is none."""
-    names = [os.environ.get("CC", ""), "cc", "gcc", "clang"]
-    return next((found for name in names if name and (found := shutil.which(name))), None)
+_WITHOUT_OBJECTS: set[str] = set()  # compilers that could not make or link one
 
 
 @cache
@@ -96,8 +88,24 @@ def structures(precision: Precision, short: int, long: int) -> tuple[Any, Any]:
     return MpcIn, MpcOut
 
 
+def loaded(file: Path) -> ctypes.CDLL:
+    """Load a library, to be closed when neither it nor any of its functions is in use.
+
+    The functions of a `CDLL` keep it; a variable in it (`in_dll`) does not.
+
+    Raises
+    ------
+    OSError
+        If it cannot be loaded.
+    """
+    library = ctypes.CDLL(str(file))
+    closing = finalize(library, dlclose, library._handle)
+    closing.atexit = False  # then the process ends, and what is left may still call into it
+    return library
+
+
 class HostLibrary:
-    """A loaded library, its layout checked.
+    """A loaded library, its layout checked; closed when it is no longer used.
 
     Attributes
     ----------
@@ -129,9 +137,10 @@ class HostLibrary:
             precision, sizes.short_stages, sizes.long_stages
         )
         try:
-            self.functions = ctypes.CDLL(str(file))
+            self.functions = loaded(file)
+            # not as attributes, which the library would keep: a circle, and closed late
             abi, self.init, self.depart, self.step, self.plan = (
-                getattr(self.functions, f"{prefix}mpc_{name}")
+                self.functions[f"{prefix}mpc_{name}"]
                 for name in ("abi", "init", "depart", "step", "plan")
             )
         except (OSError, AttributeError) as error:
@@ -202,13 +211,13 @@ def _kept(files: Mapping[str, str]) -> Kept:
     command = compiler()
     if command is None:
         raise CodegenError("no C compiler found (tried $CC, cc, gcc, clang)")
+    sources = {n: t for n, t in files.items() if n.endswith((".c", ".h")) and not is_example(n)}
     try:
         found = Path(command).stat()
-        identity = (command, found.st_size, found.st_mtime_ns, platform.machine(), FLAGS)
-        digest = hashlib.sha256(f"{identity} {_version(identity)!r}".encode())
-        for name, text in files.items():
-            digest.update(f"{name}\0{text}\0".encode())
-        kept = kept_library(digest.hexdigest()[:24], lambda: _built(files, command))
+        said = version(command, found.st_size, found.st_mtime_ns)
+        identity = f"{command, found.st_size, found.st_mtime_ns, platform.machine(), said}"
+        key = _key(f"{identity} {FLAGS}", sources)
+        kept = kept_file(key, ".so", lambda: _built(sources, command, identity))
     except OSError as error:
         raise CodegenError(f"no compiled controller: {error}; {NEEDS_NONE}") from error
     if kept.remark:
@@ -216,34 +225,24 @@ def _kept(files: Mapping[str, str]) -> Kept:
     return kept
 
 
-@cache
-def _version(identity: tuple[str | int, ...]) -> bytes:
-    """Return what a compiler says of itself; its file may be a wrapper that stays the same."""
-    said = subprocess.run([str(identity[0]), "--version"], capture_output=True, check=False)
-    return said.stdout
+def _key(identity: str, files: Mapping[str, str]) -> str:
+    digest = hashlib.sha256(identity.encode())
+    for name, text in files.items():
+        digest.update(f"{name}\0{text}\0".encode())
+    return digest.hexdigest()[:24]
 
 
-def _built(files: Mapping[str, str], command: str) -> bytes:
-    """Compile; returns the content of the library."""
+def _built(files: Mapping[str, str], command: str, identity: str) -> bytes:
+    """Return the content of a library, made from the object of all but its numbers if possible."""
+    if DATA not in files or identity in _WITHOUT_OBJECTS:
+        return library_of(command, files)
+    others = {name: text for name, text in files.items() if name != DATA}
+    key = _key(f"{identity} {RELOCATABLE}", others)
     try:
-        with tempfile.TemporaryDirectory() as scratch:
-            folder = Path(scratch)
-            for name, text in files.items():
-                write_text(folder / name, text)
-            sources = sorted(n for n in files if n.endswith(".c") and not is_example(n))
-            result = subprocess.run(
-                [command, *FLAGS.split(), "-o", "libmpc.so", *sources, "-lm"],
-                cwd=folder,
-                capture_output=True,
-                text=True,
-                errors="replace",
-                check=False,
-            )
-            made = folder / "libmpc.so"
-            content = made.read_bytes() if made.exists() and not result.returncode else b""
-    except OSError as error:
-        raise CodegenError(f"C compiler {command} cannot be run: {error}; {NEEDS_NONE}") from error
-    if not content:
-        first = next(iter(result.stderr.strip().splitlines()), "no library was built")
-        raise CodegenError(f"C compiler {command} failed: {first}; {NEEDS_NONE}")
-    return content
+        common = kept_file(key, ".o", lambda: common_object(command, others))
+        return library_of(command, files, common.file)
+    except CodegenError as error:
+        content = library_of(command, files)
+        _WITHOUT_OBJECTS.add(identity)
+        say_once(f"every new vehicle takes a full compilation, about a second: {error}")
+        return content

@@ -1,7 +1,7 @@
 """Which implementation runs a QP controller on this machine: generated C, or Python."""
 
+from qpmpc.codegen.c_compiler import CodegenError, compiler
 from qpmpc.codegen.controller import GeneratedController
-from qpmpc.codegen.host_library import CodegenError, compiler
 from qpmpc.controllers.base import Controller
 from qpmpc.controllers.qp_planner import QpPlanner
 from qpmpc.controllers.receding_horizon import RecedingHorizon

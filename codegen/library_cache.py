@@ -1,9 +1,10 @@
-"""Compiled libraries kept on disk, in a folder that nobody else can write to.
+"""Compiled libraries and objects kept on disk, in a folder that nobody else can write to.
 
-A library's name holds the key of what it was made from and the SHA-256 of its content. It is loaded
-only if that is still its content. Between this check and the loading nobody can change it, because
-the folder is private: that is checked before each use, up to the root of the file system. Where no
-such folder can be had, a temporary one of this process takes its place.
+A file's name holds the key of what it was made from and the SHA-256 of its content. It is loaded or
+linked only if that is still its content. Between this check and its use nobody can change it,
+because the folder is private: that is checked before each use, up to the root of the file system.
+Where no such folder can be had, a temporary one of this process takes its place. Of processes that
+want the same file at once, one makes it and the others wait, for a limited time.
 """
 
 import atexit
@@ -13,7 +14,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from fcntl import LOCK_EX, LOCK_SH, flock
+from fcntl import LOCK_EX, LOCK_NB, LOCK_SH, flock
 from functools import cache
 from grp import getgrgid
 from hashlib import sha256
@@ -24,17 +25,20 @@ from typing import NamedTuple
 
 from qpmpc.files import replace_file
 
-MOST_BYTES = 64 * 2**20  # of all libraries together; one has about a quarter of a MiB
-IN_USE_S = 60.0  # a library used in this time may be about to be loaded: it is not deleted
+MOST_BYTES = 64 * 2**20  # of all files together; a library or object has about 80 KiB
+IN_USE_S = 60.0  # a file used in this time may be about to be loaded: it is not deleted
+# for another process that makes the same; a library waits for its object too: twice this at most
+LONGEST_WAIT_S = 30.0
+POLL_S = 0.01
 _OTHERS_WRITE = S_IWGRP | S_IWOTH
 
 
 class Kept(NamedTuple):
-    """A library that may be loaded.
+    """A file that may be loaded or linked.
 
     Attributes
     ----------
-    file : of the library
+    file : of the library or object
     remark : the folder in which it cannot be kept and why, in one line; empty if it is kept
     """
 
@@ -42,12 +46,13 @@ class Kept(NamedTuple):
     remark: str = ""
 
 
-def kept_library(key: str, build: Callable[[], bytes]) -> Kept:
-    """Return the library of a key, built if it is not there or is not what was stored.
+def kept_file(key: str, suffix: str, build: Callable[[], bytes]) -> Kept:
+    """Return the file of a key, built if it is not there or is not what was stored.
 
     Parameters
     ----------
-    key : hash of all that the library is made from
+    key : hash of all that the file is made from
+    suffix : of its name, `.so` or `.o`
     build : makes its content
 
     Raises
@@ -60,14 +65,18 @@ def kept_library(key: str, build: Callable[[], bytes]) -> Kept:
     try:
         fault = _fault(folder)
         if not fault:
-            if found := _whole(folder, key):
+            if found := _whole(folder, key, suffix):
                 return Kept(found)
-            content = build()
-            return Kept(_stored(folder, key, content))
+            with _alone(folder, key):
+                if found := _whole(folder, key, suffix):  # made while this process waited
+                    return Kept(found)
+                content = build()
+                return Kept(_stored(folder, key, suffix, content))
     except OSError as error:
         fault = str(error.strerror)
     private = _private_folder(os.getpid())
-    file = _whole(private, key) or _stored(private, key, content or build())
+    found = _whole(private, key, suffix)
+    file = found or _stored(private, key, suffix, content or build())
     return Kept(file, f"compiled controllers are not kept for the next run: {folder}: {fault}")
 
 
@@ -146,13 +155,13 @@ def _private_folder(process: int) -> Path:
     return folder
 
 
-def _whole(folder: Path, key: str) -> Path | None:
-    """Return the library if it is as it was stored; whatever else has its name is removed."""
+def _whole(folder: Path, key: str, suffix: str) -> Path | None:
+    """Return the file if it is as it was stored; whatever else has its name is removed."""
     with _locked(folder, LOCK_SH):
-        for file in folder.glob(f"{key}-*.so"):
+        for file in folder.glob(f"{key}-*{suffix}"):
             with suppress(OSError):
                 content = _content(file)
-                if content and file.name == _name(key, content):
+                if content and file.name == _name(key, suffix, content):
                     os.utime(file)  # the last to be deleted
                     return file
                 file.unlink()
@@ -171,19 +180,19 @@ def _content(file: Path) -> bytes:
         return stream.read() if ours and not found.st_mode & _OTHERS_WRITE else b""
 
 
-def _name(key: str, content: bytes) -> str:
-    return f"{key}-{sha256(content).hexdigest()}.so"
+def _name(key: str, suffix: str, content: bytes) -> str:
+    return f"{key}-{sha256(content).hexdigest()}{suffix}"
 
 
-def _stored(folder: Path, key: str, content: bytes) -> Path:
-    file = folder / _name(key, content)
-    replace_file(file, content, mode=0o600, durable=True)
+def _stored(folder: Path, key: str, suffix: str, content: bytes) -> Path:
+    file = folder / _name(key, suffix, content)
+    replace_file(file, content, mode=0o600)
     _bound(folder, file)
     return file
 
 
 def _bound(folder: Path, newest: Path) -> None:
-    """Delete the libraries, and what broken writes left, that were not used for longest."""
+    """Delete the files, and what broken writes left, that were not used for longest."""
     with _locked(folder, LOCK_EX):
         total, now = 0, time.time()
         for used_s, size, file in sorted(_files(folder), reverse=True):
@@ -195,7 +204,7 @@ def _bound(folder: Path, newest: Path) -> None:
 
 def _files(folder: Path) -> Iterator[tuple[float, int, Path]]:
     """Time of the last use, size and name."""
-    for pattern in ("*.so", ".*.tmp"):
+    for pattern in ("*.so", "*.o", ".*.tmp", ".*.lock"):
         for file in folder.glob(pattern):
             with suppress(FileNotFoundError):  # a temporary one, renamed meanwhile
                 found = file.lstat()
@@ -203,8 +212,41 @@ def _files(folder: Path) -> Iterator[tuple[float, int, Path]]:
 
 
 @contextmanager
+def _alone(folder: Path, key: str) -> Iterator[None]:
+    """Let others that would make the same wait; one that waited for long goes on beside them.
+
+    The lock goes with its process.
+    """
+    file = folder / f".{key}.lock"
+    until = time.monotonic() + LONGEST_WAIT_S
+    while (handle := _lock(file)) is None and time.monotonic() < until:
+        time.sleep(POLL_S)
+    try:
+        yield
+    finally:
+        if handle is not None:
+            file.unlink(missing_ok=True)
+            os.close(handle)
+
+
+def _lock(file: Path) -> int | None:
+    """Return the descriptor of a lock file that is locked and still there; None if another's is."""
+    handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o600)
+    try:
+        flock(handle, LOCK_EX | LOCK_NB)
+        if os.path.samestat(os.fstat(handle), file.stat()):
+            return handle
+    except (BlockingIOError, FileNotFoundError):
+        pass
+    except OSError:  # some network file systems do not lock: then each makes its own
+        return handle
+    os.close(handle)
+    return None
+
+
+@contextmanager
 def _locked(folder: Path, how: int) -> Iterator[None]:
-    """Let nothing be deleted between the check of a library and the note that it is in use."""
+    """Let nothing be deleted between the check of a file and the note that it is in use."""
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         with suppress(OSError):  # some network file systems lock no folders

@@ -1,6 +1,7 @@
 """OSQP's own embedded C code for a controller's quadratic program, from the installed wheel."""
 
 import re
+from functools import cache
 from importlib.metadata import distribution
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -73,6 +74,7 @@ def osqp_files(values: Values, precision: str) -> dict[str, str]:
     return {f"{FOLDER}/{name}": text for name, text in sorted(texts.items())}
 
 
+@cache
 def osqp_version() -> str:
     """Return the version of the installed OSQP."""
     return distribution("osqp").version

@@ -43,7 +43,8 @@ def with_prefix(files: Mapping[str, str], prefix: str) -> dict[str, str]:
     InputError
         If the prefix cannot begin a name in C.
     """
-    checked_prefix(prefix)
+    if not checked_prefix(prefix):
+        return dict(files)
 
     def renamed(text: str) -> str:
         return _MACRO.sub(prefix.upper(), _NAME.sub(prefix, text))

@@ -23,7 +23,7 @@ from qpmpc.solvers.settings import AdmmSettings
 from qpmpc.vehicle import demand
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.capability import Capability
-from qpmpc.vehicle.engine import OptimalLine
+from qpmpc.vehicle.engine import OptimalLine, optimal_line
 from qpmpc.vehicle.parameters import Vehicle
 
 EQUALITY_RHO_FACTOR = 1000.0  # OSQP's own, on rows whose bounds are closer than the next figure
@@ -139,7 +139,7 @@ def values_of(
     """
     _refuse_unknown(settings, section)
     model = PwaModel.of(vehicle, settings.pwa)
-    line, maps = OptimalLine(vehicle.engine), BatteryMaps(vehicle.battery)
+    line, maps = optimal_line(vehicle.engine), BatteryMaps(vehicle.battery)
     blocks = settings.horizon.blocks if blocks is None else blocks
     if blocks < 1:
         raise InputError(

@@ -16,7 +16,7 @@ from qpmpc import (
     simulate,
 )
 from qpmpc.closed_loop import drive
-from qpmpc.codegen.host_library import compiler
+from qpmpc.codegen.c_compiler import compiler
 from qpmpc.controllers.base import Decision
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.registry import make_controller

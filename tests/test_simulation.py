@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from qpmpc import Command, Controller, remarks
-from qpmpc.codegen.host_library import compiler
+from qpmpc.codegen.c_compiler import compiler
 from qpmpc.comparison import compare
 from qpmpc.controllers.ecms import Ecms
 from qpmpc.controllers.mh_qp import MhQp

@@ -1,6 +1,6 @@
 """C code of the algorithms from the table of rows: ADMM's and OSQP's work on a stage's rows."""
 
-from collections.abc import Iterable
+from functools import lru_cache
 
 from qpmpc.codegen.rows.elimination import (
     Elimination,
@@ -28,19 +28,19 @@ from qpmpc.qp.rows import ROWS, Entry, Var
 MATRIX = "const mpc_stage_matrix *const a = &stage->a;"
 
 
-def rows_files(scalars: Iterable[str], algorithm: str) -> dict[str, str]:
-    """Return the headers that are made from the table of rows, by name.
+@lru_cache(maxsize=8)
+def rows_files(scalars: tuple[str, ...], algorithm: str) -> dict[str, str]:
+    """Return the headers that are made from the table of rows, by name; not to be changed.
 
     Parameters
     ----------
     scalars : names of the controller's parameters
     algorithm : `admm` or `osqp`
     """
-    names = list(scalars)
     files = {
-        "mpc_heat.h": heat_h(names),
+        "mpc_heat.h": heat_h(scalars),
         "mpc_rows.h": types_h(),
-        "mpc_rows_values.h": values_h(names),
+        "mpc_rows_values.h": values_h(scalars),
     }
     if algorithm == "osqp":
         return files | {"mpc_rows_osqp.h": osqp_h()}

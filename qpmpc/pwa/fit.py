@@ -66,11 +66,13 @@ def convex_envelope(x: NDArray[np.float64], f: NDArray[np.float64]) -> NDArray[n
 
     Andrew's monotone chain: a point stays only if the slope into it is below the slope out of it.
     """
+    at, value = x.tolist(), f.tolist()  # numbers of Python are several times faster here
     hull: list[int] = []
-    for i in range(len(x)):
+    for i in range(len(at)):
         while len(hull) >= 2:
             a, b = hull[-2], hull[-1]
-            if (f[b] - f[a]) * (x[i] - x[b]) < (f[i] - f[b]) * (x[b] - x[a]):
+            rise, run = value[b] - value[a], at[b] - at[a]
+            if rise * (at[i] - at[b]) < (value[i] - value[b]) * run:
                 break
             hull.pop()
         hull.append(i)
@@ -89,20 +91,22 @@ def _tangent_pieces(
     slopes, intercepts, starts = [], [], []
     at, value, i = float(x[0]), float(f[0] - band[0]), 0
     while True:
-        ahead = np.arange(i + 1, len(x))
-        slope = float(np.min((f[ahead] - value) / (x[ahead] - at)))
+        slope = float(((f[i + 1 :] - value) / (x[i + 1 :] - at)).min())
         slopes.append(slope)
         intercepts.append(value - slope * at)
         starts.append(at)
-        surplus = band - (f - (value + slope * (x - at)))  # of the line above the band's edge
-        touch = ahead[np.argmin(f[ahead] - slope * x[ahead])]
-        outside = np.flatnonzero((surplus < 0.0) & (np.arange(len(x)) > touch))
-        if len(outside) == 0:
+        touch = i + 1 + int((f[i + 1 :] - slope * x[i + 1 :]).argmin())
+        # of the line above the band's edge, from where it touches f
+        surplus = band[touch:] - (f[touch:] - (value + slope * (x[touch:] - at)))
+        outside = surplus < 0.0
+        outside[0] = False
+        first = int(outside.argmax())
+        if not outside[first]:
             return slopes, intercepts, starts
-        j = int(outside[0])
+        j = touch + first
         # The line leaves the band between two samples, where f is linear.
-        inside = max(float(surplus[j - 1]), 0.0)
-        at = float(x[j - 1] + inside / (inside - surplus[j]) * (x[j] - x[j - 1]))
+        inside = max(float(surplus[first - 1]), 0.0)
+        at = float(x[j - 1] + inside / (inside - surplus[first]) * (x[j] - x[j - 1]))
         value = value + slope * (at - starts[-1])
         i = int(np.searchsorted(x, at, side="right")) - 1
         if i == len(x) - 1:  # only round-off at the last sample was outside
@@ -152,6 +156,8 @@ def fit_convex(
     intercept = np.array(intercepts) + high * np.interp(middles, x_, allowed)
     meet = -np.diff(intercept) / np.diff(slope)
     unchecked = PwaFit(slope, intercept, np.array([x_[0], *meet, x_[-1]]), 0.0, 0.0)
+    for array in (slope, intercept, unchecked.breakpoints):
+        array.flags.writeable = False  # a fit is kept and shared
     error = unchecked(x_) - f_
     return PwaFit(
         slope,

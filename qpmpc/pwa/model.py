@@ -1,6 +1,7 @@
 """The controller's piecewise-affine model of a vehicle: fuel, battery, cold multiplier."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
@@ -9,13 +10,14 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from qpmpc.pwa.fit import PwaFit, fit_convex
 from qpmpc.vehicle.battery import BatteryMaps
-from qpmpc.vehicle.engine import OptimalLine, alpha
-from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.vehicle.engine import OptimalLine, alpha, optimal_line
+from qpmpc.vehicle.parameters import Battery, ColdEngine, Engine, Vehicle
 
 BATTERY_STEP_W = 25.0
 ALPHA_STEP_K = 0.05
 ALPHA_COLDEST_DEGC = -20.0
 ALPHA_HOTTEST_DEGC = 95.0
+FITS_KEPT = 32  # of each curve: vehicles that differ elsewhere, in the weather say, share them
 
 
 class PwaTolerances(BaseModel):
@@ -61,47 +63,68 @@ class PwaModel:
     def of(cls, vehicle: Vehicle, tolerances: PwaTolerances | None = None) -> "PwaModel":
         """Fit the PWA curves of a vehicle."""
         tol = tolerances or PwaTolerances()
-        line, maps = OptimalLine(vehicle.engine), BatteryMaps(vehicle.battery)
         soc = vehicle.trip.soc_init
-        power, internal = battery_samples(vehicle)
-        temperature, multiplier = alpha_samples(vehicle)
         return cls(
-            fuel=fit_convex(
-                line.power_w,
-                line.fuel_g_per_s,
-                tol.fuel_g_per_s * np.maximum(line.power_w / tol.fuel_knee_w, 1.0) ** 2,
-            ),
-            battery=fit_convex(
-                power,
-                internal,
-                tol.battery_w + tol.battery_share * np.abs(power),
-                interpolation_error=_curvature_error(internal),
-            ),
-            alpha=fit_convex(
-                temperature, multiplier, tol.alpha, interpolation_error=_curvature_error(multiplier)
-            ),
-            battery_energy_j=maps.energy_j(soc),
-            line=line,
+            fuel=_fuel(vehicle.engine, tol.fuel_g_per_s, tol.fuel_knee_w),
+            battery=_battery(vehicle.battery, soc, tol.battery_w, tol.battery_share),
+            alpha=_alpha(vehicle.cold_engine, *_alpha_range_degc(vehicle), tol.alpha),
+            battery_energy_j=BatteryMaps(vehicle.battery).energy_j(soc),
+            line=optimal_line(vehicle.engine),
         )
+
+
+@lru_cache(maxsize=FITS_KEPT)
+def _fuel(engine: Engine, tolerance_g_per_s: float, knee_w: float) -> PwaFit:
+    line = optimal_line(engine)
+    allowed = tolerance_g_per_s * np.maximum(line.power_w / knee_w, 1.0) ** 2
+    return fit_convex(line.power_w, line.fuel_g_per_s, allowed)
+
+
+@lru_cache(maxsize=FITS_KEPT)
+def _battery(battery: Battery, soc: float, tolerance_w: float, share: float) -> PwaFit:
+    power, internal = _battery_samples(battery, soc)
+    allowed = tolerance_w + share * np.abs(power)
+    return fit_convex(power, internal, allowed, interpolation_error=_curvature_error(internal))
+
+
+@lru_cache(maxsize=FITS_KEPT)
+def _alpha(cold: ColdEngine, coldest: float, hottest: float, tolerance: float) -> PwaFit:
+    temperature, multiplier = _alpha_samples(cold, coldest, hottest)
+    error = _curvature_error(multiplier)
+    return fit_convex(temperature, multiplier, tolerance, interpolation_error=error)
 
 
 def battery_samples(vehicle: Vehicle) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Sample terminal power (W) -> internal power (W) over the battery's power range."""
-    battery = vehicle.battery
+    return _battery_samples(vehicle.battery, vehicle.trip.soc_init)
+
+
+def _battery_samples(
+    battery: Battery, soc: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     span = battery.power_discharge_max_w + battery.power_charge_max_w
     count = int(np.ceil(span / BATTERY_STEP_W)) + 1
     power = np.linspace(-battery.power_charge_max_w, battery.power_discharge_max_w, count)
-    maps = BatteryMaps(battery)
-    return power, maps.internal_power_w(vehicle.trip.soc_init, power)
+    return power, BatteryMaps(battery).internal_power_w(soc, power)
 
 
 def alpha_samples(vehicle: Vehicle) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Sample coolant temperature (degC) -> alpha, from below any start to above the thermostat."""
-    coldest = min(ALPHA_COLDEST_DEGC, vehicle.thermal.t_amb_degc, vehicle.trip.t_cl_init_degc)
-    hottest = max(ALPHA_HOTTEST_DEGC, vehicle.trip.t_cl_init_degc)
+    return _alpha_samples(vehicle.cold_engine, *_alpha_range_degc(vehicle))
+
+
+def _alpha_range_degc(vehicle: Vehicle) -> tuple[float, float]:
+    start = vehicle.trip.t_cl_init_degc
+    coldest = min(ALPHA_COLDEST_DEGC, vehicle.thermal.t_amb_degc, start)
+    return coldest, max(ALPHA_HOTTEST_DEGC, start)
+
+
+def _alpha_samples(
+    cold: ColdEngine, coldest: float, hottest: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     count = int(np.ceil((hottest - coldest) / ALPHA_STEP_K)) + 1
     temperature = np.linspace(coldest, hottest, count)
-    return temperature, alpha(vehicle.cold_engine, temperature)
+    return temperature, alpha(cold, temperature)
 
 
 def _curvature_error(samples: NDArray[np.float64]) -> float:

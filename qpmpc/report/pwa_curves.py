@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from qpmpc.pwa.fit import PwaFit
 from qpmpc.pwa.model import PwaModel, alpha_samples, battery_samples
-from qpmpc.vehicle.engine import OptimalLine
+from qpmpc.vehicle.engine import optimal_line
 from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
@@ -47,7 +47,7 @@ class PwaCurve:
 
 def pwa_curves(vehicle: Vehicle) -> list[PwaCurve]:
     """Return fuel, battery and cold multiplier with the fits that the controllers use."""
-    model, line = PwaModel.of(vehicle), OptimalLine(vehicle.engine)
+    model, line = PwaModel.of(vehicle), optimal_line(vehicle.engine)
     return [
         PwaCurve(
             title="fuel of the hot engine",

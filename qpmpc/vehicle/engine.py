@@ -1,5 +1,7 @@
 """Engine: fuel map, optimal operating line, cold multiplier."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -9,6 +11,7 @@ from qpmpc.vehicle.table import Table
 
 LINE_STEP_W = 50.0
 MAP_STEP_RPM = 5.0
+LINES_KEPT = 32  # some 80 KiB each
 
 
 def fuel_power_w(engine: Engine, speed_rpm: ArrayLike, power_w: ArrayLike) -> NDArray[np.float64]:
@@ -61,6 +64,21 @@ class OptimalLine:
         self.fuel_g_per_s = fuel_w[np.arange(count), best] / engine.lhv_j_per_kg * 1e3
         self.fuel = Table(self.power_w, self.fuel_g_per_s)
         self.power_max_w = engine.power_max_w
+
+
+@lru_cache(maxsize=LINES_KEPT)
+def optimal_line(engine: Engine) -> OptimalLine:
+    """Return the optimal line of an engine, kept for the next user; its arrays are read-only.
+
+    Raises
+    ------
+    InputError
+        If the torque limit does not allow the rated power.
+    """
+    line = OptimalLine(engine)
+    for array in (line.power_w, line.speed_rpm, line.torque_nm, line.fuel_g_per_s):
+        array.flags.writeable = False
+    return line
 
 
 def alpha(cold: ColdEngine, t_cl_degc: ArrayLike) -> NDArray[np.float64]:

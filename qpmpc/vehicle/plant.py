@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from qpmpc.vehicle import heat
 from qpmpc.vehicle.battery import BatteryMaps
-from qpmpc.vehicle.engine import OptimalLine, alpha_at
+from qpmpc.vehicle.engine import alpha_at, optimal_line
 from qpmpc.vehicle.parameters import Vehicle
 
 POWER_TOLERANCE_W = 1e-6
@@ -75,7 +75,7 @@ class Plant:
     def __init__(self, vehicle: Vehicle, step_s: float = 1.0) -> None:
         self.vehicle = vehicle
         self.step_s = step_s
-        self.line = OptimalLine(vehicle.engine)
+        self.line = optimal_line(vehicle.engine)
         self.battery = BatteryMaps(vehicle.battery)
 
     def initial_state(self) -> PlantState:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from qpmpc.codegen.host_library import compiler
+from qpmpc.codegen.c_compiler import compiler
 from qpmpc.controllers.settings import MhQpSettings
 
 EXTRAS = (
@@ -67,8 +67,8 @@ def test_vehicle_and_settings_reach_the_code(cli, tmp_path):
     )
     assert done.code == 0
     config, data = ((tmp_path / n).read_text() for n in ("mpc_config.h", "mpc_data.c"))
-    assert "Vehicle: prius-liion" in config
     assert re.search(r"#define MPC_BLOCKS 4\b", config)
+    assert "Vehicle: prius-liion" in data
     assert ".t_amb_degc = 3.0," in data
 
 

@@ -16,8 +16,9 @@ import pytest
 from numpy.typing import NDArray
 from recorded import REPLAY_C, Recorder
 
+from qpmpc.codegen.c_compiler import compiler
 from qpmpc.codegen.generate import Precision, project_files
-from qpmpc.codegen.host_library import compiled, compiler
+from qpmpc.codegen.host_library import compiled
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.results import Run

@@ -8,8 +8,9 @@ import pytest
 from forecast_inputs import ForecastInputs
 
 from qpmpc.closed_loop import drive
+from qpmpc.codegen.c_compiler import compiler
 from qpmpc.codegen.controller import GeneratedController, InputBuilder
-from qpmpc.codegen.host_library import HostLibrary, build_host_library, compiler
+from qpmpc.codegen.host_library import HostLibrary, build_host_library
 from qpmpc.codegen.values import values_of
 from qpmpc.controllers.monitor import Flag
 from qpmpc.controllers.settings import ControllerSettings

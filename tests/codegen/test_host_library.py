@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from qpmpc.closed_loop import drive
+from qpmpc.codegen.c_compiler import CodegenError, compiler
 from qpmpc.codegen.controller import GeneratedController
-from qpmpc.codegen.host_library import CodegenError, compiled, compiler
+from qpmpc.codegen.host_library import compiled
 from qpmpc.codegen.values import CONSTANTS
 from qpmpc.controllers.base import Decision
 from qpmpc.controllers.mh_qp import MhQp

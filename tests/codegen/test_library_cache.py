@@ -11,8 +11,9 @@ import pytest
 
 from qpmpc import remarks
 from qpmpc.codegen import library_cache
-from qpmpc.codegen.host_library import CodegenError, HostLibrary, compiled, compiler
-from qpmpc.codegen.library_cache import Kept, kept_library
+from qpmpc.codegen.c_compiler import CodegenError, compiler
+from qpmpc.codegen.host_library import HostLibrary, compiled
+from qpmpc.codegen.library_cache import Kept, kept_file
 from qpmpc.codegen.values import values_of
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle
@@ -47,13 +48,13 @@ def is_private(kept: Kept) -> bool:
 
 
 def test_a_library_is_made_once_and_nobody_else_can_write_it(folder):
-    file, remark = kept_library(KEY, made_once)
+    file, remark = kept_file(KEY, ".so", made_once)
     assert remark == ""
     assert file.read_bytes() == CONTENT
     assert list(folder.iterdir()) == [file]
     assert folder.stat().st_mode & 0o777 == 0o700
     assert file.stat().st_mode & 0o777 == 0o600
-    assert kept_library(KEY, not_made).file == file
+    assert kept_file(KEY, ".so", not_made).file == file
 
 
 def truncated(file: Path) -> None:
@@ -84,9 +85,9 @@ def fifo(file: Path) -> None:
 
 @pytest.mark.parametrize("spoil", [truncated, emptied, altered, link, writable, fifo])
 def test_what_is_not_as_it_was_stored_is_made_again(folder, spoil):
-    file = kept_library(KEY, made_once).file
+    file = kept_file(KEY, ".so", made_once).file
     spoil(file)
-    assert kept_library(KEY, made_once) == Kept(file)
+    assert kept_file(KEY, ".so", made_once) == Kept(file)
     assert file.read_bytes() == CONTENT
     assert file.is_file()
     assert not file.is_symlink()
@@ -94,24 +95,24 @@ def test_what_is_not_as_it_was_stored_is_made_again(folder, spoil):
 
 
 def test_a_library_with_a_second_name_is_made_again(folder, tmp_path):
-    file = kept_library(KEY, made_once).file
+    file = kept_file(KEY, ".so", made_once).file
     (tmp_path / "second").hardlink_to(file)
-    assert kept_library(KEY, made_once) == Kept(file)
+    assert kept_file(KEY, ".so", made_once) == Kept(file)
     assert file.stat().st_nlink == 1
 
 
 def test_an_empty_file_whose_name_has_the_hash_of_nothing_is_not_taken(folder):
-    file = kept_library(KEY, made_once).file
-    file.rename(file.with_name(library_cache._name(KEY, b"")))
-    file.with_name(library_cache._name(KEY, b"")).write_bytes(b"")
-    assert kept_library(KEY, made_once) == Kept(file)
+    file = kept_file(KEY, ".so", made_once).file
+    file.rename(file.with_name(library_cache._name(KEY, ".so", b"")))
+    file.with_name(library_cache._name(KEY, ".so", b"")).write_bytes(b"")
+    assert kept_file(KEY, ".so", made_once) == Kept(file)
 
 
 @needs_root
 def test_a_library_of_another_owner_is_made_again(folder):
-    file = kept_library(KEY, made_once).file
+    file = kept_file(KEY, ".so", made_once).file
     os.chown(file, 12345, -1)
-    assert kept_library(KEY, made_once) == Kept(file)
+    assert kept_file(KEY, ".so", made_once) == Kept(file)
     assert file.stat().st_uid == os.geteuid()
 
 
@@ -119,20 +120,20 @@ def test_a_library_of_another_owner_is_made_again(folder):
 def test_a_folder_that_others_may_write_to_is_not_used(folder, mode):
     folder.mkdir(parents=True)
     folder.chmod(mode)
-    kept = kept_library(KEY, made_once)
+    kept = kept_file(KEY, ".so", made_once)
     assert is_private(kept)
     assert str(folder) in kept.remark
     assert f"others may write to it (mode {mode:o}" in kept.remark
     assert "\n" not in kept.remark
     assert list(folder.iterdir()) == []
-    assert kept_library(KEY, not_made) == kept  # made once a process all the same
+    assert kept_file(KEY, ".so", not_made) == kept  # made once a process all the same
 
 
 def test_a_folder_that_is_a_link_is_not_used(folder, tmp_path):
     (tmp_path / "elsewhere").mkdir(mode=0o700)
     folder.parent.mkdir()
     folder.symlink_to(tmp_path / "elsewhere")
-    kept = kept_library(KEY, made_once)
+    kept = kept_file(KEY, ".so", made_once)
     assert is_private(kept)
     assert "link" in kept.remark
     assert list((tmp_path / "elsewhere").iterdir()) == []
@@ -143,7 +144,7 @@ def test_a_folder_that_is_a_link_is_not_used(folder, tmp_path):
 def test_a_folder_in_the_hands_of_another_is_not_used(folder, whose):
     folder.mkdir(parents=True, mode=0o700)
     os.chown(folder / whose, 12345, -1)
-    kept = kept_library(KEY, made_once)
+    kept = kept_file(KEY, ".so", made_once)
     assert is_private(kept)
     assert "belongs to user 12345" in kept.remark
 
@@ -151,23 +152,23 @@ def test_a_folder_in_the_hands_of_another_is_not_used(folder, whose):
 def test_a_folder_that_others_could_rename_is_not_used_unless_its_parent_is_sticky(folder):
     folder.parent.mkdir()
     folder.parent.chmod(0o777)
-    kept = kept_library(KEY, made_once)
+    kept = kept_file(KEY, ".so", made_once)
     assert is_private(kept)
     assert f"others may write to {folder.parent}" in kept.remark
     folder.parent.chmod(0o1777)  # as /tmp is
-    assert kept_library(KEY, made_once).file.parent == folder
+    assert kept_file(KEY, ".so", made_once).file.parent == folder
 
 
 def test_links_above_the_folder_are_followed_once(folder, tmp_path):
     """As where a home is on another disk; the library is then loaded by its real path."""
     (tmp_path / "disk").mkdir()
     folder.parent.symlink_to(tmp_path / "disk")
-    assert kept_library(KEY, made_once).file.parent == tmp_path / "disk" / "compiled"
+    assert kept_file(KEY, ".so", made_once).file.parent == tmp_path / "disk" / "compiled"
 
 
 def test_a_folder_that_cannot_be_made_is_named_with_the_reason(folder):
     folder.parent.write_text("a file")
-    kept = kept_library(KEY, made_once)
+    kept = kept_file(KEY, ".so", made_once)
     assert is_private(kept)
     assert str(folder) in kept.remark
     assert kept.remark.endswith("exists") or "ot a directory" in kept.remark
@@ -182,7 +183,7 @@ def test_a_disk_that_is_full_is_named_and_leaves_nothing(folder, monkeypatch, tm
     whole = library_cache.replace_file
     monkeypatch.setattr(library_cache, "replace_file", full)
     made = []
-    kept = kept_library(KEY, lambda: made.append(1) or CONTENT)
+    kept = kept_file(KEY, ".so", lambda: made.append(1) or CONTENT)
     assert is_private(kept)
     assert kept.remark.endswith(f"{folder}: No space left on device")
     assert len(made) == 1  # not compiled again for the other place
@@ -205,30 +206,30 @@ def test_the_cache_is_bounded_and_forgets_what_was_not_used_for_longest(folder, 
     files = {}
     for i in range(5):
         key = f"{i:024}"
-        files[i] = kept_library(key, made_once).file
+        files[i] = kept_file(key, ".so", made_once).file
         hour_ago = time.time() - 3600 + i
         os.utime(files[i], (hour_ago, hour_ago))
     left_over = folder / ".0123456789abcdef.tmp"  # of a process that was killed
     left_over.write_bytes(CONTENT)
     os.utime(left_over, (1.0, 1.0))
-    assert kept_library(f"{0:024}", not_made).file == files[0]  # the oldest, used again
-    newest = kept_library(KEY[:-1] + "9", made_once).file
+    assert kept_file(f"{0:024}", ".so", not_made).file == files[0]  # the oldest, used again
+    newest = kept_file(KEY[:-1] + "9", ".so", made_once).file
     assert set(folder.iterdir()) == {newest, files[0], files[2], files[3], files[4]}
 
 
 def test_a_library_in_use_is_not_forgotten_however_full_the_cache(folder, monkeypatch):
     monkeypatch.setattr(library_cache, "MOST_BYTES", 1)
-    files = {kept_library(f"{i:024}", made_once).file for i in range(3)}
+    files = {kept_file(f"{i:024}", ".so", made_once).file for i in range(3)}
     assert set(folder.iterdir()) == files  # each may be about to be loaded
 
 
 def test_processes_that_make_the_same_at_once_all_get_it_whole(folder):
     code = (
         "import os, sys\n"
-        "from qpmpc.codegen.library_cache import kept_library\n"
+        "from qpmpc.codegen.library_cache import kept_file\n"
         "for i in range(30):\n"
         "    content = bytes([i]) * 100_000\n"
-        "    file, remark = kept_library(f'{i:024}', lambda: content)\n"
+        "    file, remark = kept_file(f'{i:024}', '.so', lambda: content)\n"
         "    assert not remark and file.read_bytes() == content\n"
     )
     running = [subprocess.Popen([sys.executable, "-c", code]) for _ in range(4)]
@@ -241,11 +242,11 @@ def test_the_temporary_folder_goes_with_its_process_and_not_with_a_fork(folder, 
     (tmp_path / "temporary").mkdir()
     code = (
         "import os, sys\n"
-        "from qpmpc.codegen.library_cache import kept_library\n"
-        "file, remark = kept_library('0' * 24, lambda: b'content')\n"
+        "from qpmpc.codegen.library_cache import kept_file\n"
+        "file, remark = kept_file('0' * 24, '.so', lambda: b'content')\n"
         "child = os.fork()\n"
         "if child == 0:\n"
-        "    other = kept_library('0' * 24, lambda: b'content').file\n"
+        "    other = kept_file('0' * 24, '.so', lambda: b'content').file\n"
         "    assert other.exists() and other.parent != file.parent\n"
         "    sys.exit()\n"  # runs what is registered for the end
         "assert os.waitpid(child, 0)[1] == 0\n"

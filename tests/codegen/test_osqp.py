@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from qpmpc.codegen.c_compiler import compiler
 from qpmpc.codegen.controller import GeneratedController
 from qpmpc.codegen.generate import generate, project_files
-from qpmpc.codegen.host_library import HostLibrary, compiled, compiler
+from qpmpc.codegen.host_library import HostLibrary, compiled
 from qpmpc.codegen.osqp_source import matrix_pattern
 from qpmpc.codegen.values import Values, values_of
 from qpmpc.controllers.mh_qp import MhQp

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from qpmpc.codegen.c_compiler import CodegenError
 from qpmpc.codegen.firmware import (
     Target,
     build_firmware,
@@ -14,7 +15,6 @@ from qpmpc.codegen.firmware import (
     symbols,
 )
 from qpmpc.codegen.generate import MEMORY_KB, generate
-from qpmpc.codegen.host_library import CodegenError
 from qpmpc.codegen.pil.loop import PilResult, processor_in_the_loop
 from qpmpc.codegen.values import values_of
 from qpmpc.controllers.settings import ControllerSettings

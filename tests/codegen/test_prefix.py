@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from qpmpc.codegen.c_compiler import FLAGS
 from qpmpc.codegen.controller import InputBuilder
 from qpmpc.codegen.firmware import make_firmware, missing_tools, symbols
 from qpmpc.codegen.generate import (
@@ -18,7 +19,7 @@ from qpmpc.codegen.generate import (
     generate,
     project_files,
 )
-from qpmpc.codegen.host_library import FLAGS, HostLibrary, build_host_library
+from qpmpc.codegen.host_library import HostLibrary, build_host_library
 from qpmpc.codegen.prefix import with_prefix
 from qpmpc.codegen.values import Values, values_of
 from qpmpc.controllers.settings import ControllerSettings

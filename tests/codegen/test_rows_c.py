@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from qpmpc.codegen.c_compiler import compiler
 from qpmpc.codegen.generate import project_files
-from qpmpc.codegen.host_library import compiled, compiler
+from qpmpc.codegen.host_library import compiled
 from qpmpc.codegen.rows.c_text import Writer
 from qpmpc.codegen.rows.elimination import Elimination
 from qpmpc.codegen.rows.stage_c import FUNCTIONS, types_h, values_h

@@ -3,7 +3,7 @@
 import pytest
 
 from qpmpc.closed_loop import drive
-from qpmpc.codegen.host_library import compiler
+from qpmpc.codegen.c_compiler import compiler
 from qpmpc.controllers.monitor import Flag
 from qpmpc.faults.models import as_faults
 from qpmpc.registry import make_controller, split_settings

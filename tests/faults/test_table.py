@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from qpmpc.codegen.host_library import compiler
+from qpmpc.codegen.c_compiler import compiler
 from qpmpc.faults.models import as_faults
 from qpmpc.vehicle import vehicle_names
 from qpmpc.verification.faults import __main__ as command

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from qpmpc.closed_loop import drive
+from qpmpc.codegen.c_compiler import compiler
 from qpmpc.codegen.controller import GeneratedController
-from qpmpc.codegen.host_library import compiler
 from qpmpc.controllers.mh_qp import MhQp
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle

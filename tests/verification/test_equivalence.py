@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import qpmpc.verification.renderings.equivalence
-from qpmpc.codegen.host_library import compiler
+from qpmpc.codegen.c_compiler import compiler
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.errors import QpmpcError

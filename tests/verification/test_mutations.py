@@ -22,7 +22,7 @@ import qpmpc.preview.stages
 import qpmpc.pwa.model
 import qpmpc.qp.stage_qp
 import qpmpc.vehicle.heat
-from qpmpc.codegen.host_library import compiler
+from qpmpc.codegen.c_compiler import compiler
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.preview.forecast import Trace

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 
-from qpmpc.codegen.host_library import compiler
+from qpmpc.codegen.c_compiler import compiler
 from qpmpc.solvers.base import QpSolver
 from qpmpc.solvers.names import make_solver, solver_names
 

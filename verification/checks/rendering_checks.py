@@ -5,8 +5,8 @@ from math import nan
 
 import numpy as np
 
+from qpmpc.codegen.c_compiler import compiler
 from qpmpc.codegen.controller import GeneratedController
-from qpmpc.codegen.host_library import compiler
 from qpmpc.vehicle import PlantState
 from qpmpc.verification.checks.check import Check
 from qpmpc.verification.checks.context import Context, Loop

@@ -16,7 +16,7 @@ from qpmpc.controllers.receding_horizon import RecedingHorizon
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.qp.rows import Var
 from qpmpc.trip import Observation, Trip
-from qpmpc.vehicle.engine import OptimalLine, alpha
+from qpmpc.vehicle.engine import alpha, optimal_line
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.verification.nonlinear.mh_nlp import MhNlp
 from qpmpc.verification.nonlinear.problem import NlpVar
@@ -117,7 +117,7 @@ def _pair(vehicle: Vehicle, seen: Observation, qp: QpPlan, nlp: NlpPlan) -> Plan
     t_cl = np.abs(qp.x[:, Var.T_CL] - nlp.x[:, NlpVar.T_CL])
     sigma = nlp.x[:, NlpVar.ON]
     power = np.array([nlp.power_on_w(stage) for stage in range(len(h))])
-    nlp_rate = sigma * OptimalLine(vehicle.engine).fuel(power)
+    nlp_rate = sigma * optimal_line(vehicle.engine).fuel(power)
     counts = h > 0.0
     burning = np.flatnonzero(counts & (sigma > ON_LEAST))
     warmed = slice(0, 1 + (int(burning[-1]) if burning.size else 0))

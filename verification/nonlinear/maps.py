@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from qpmpc.errors import QpmpcError
 from qpmpc.vehicle.battery import BatteryMaps
-from qpmpc.vehicle.engine import OptimalLine
+from qpmpc.vehicle.engine import optimal_line
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.table import Table
 
@@ -50,7 +50,7 @@ class SmoothMaps:
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
-        self.line = line = OptimalLine(vehicle.engine)
+        self.line = line = optimal_line(vehicle.engine)
         maps = BatteryMaps(vehicle.battery)
         count = int(np.ceil(line.power_max_w / FUEL_STEP_W)) + 1
         power = np.linspace(0.0, line.power_max_w, count)

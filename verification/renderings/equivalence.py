@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from qpmpc.codegen.c_compiler import compiler
 from qpmpc.codegen.controller import InputBuilder
-from qpmpc.codegen.host_library import compiler
 from qpmpc.codegen.values import values_of
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.errors import QpmpcError

@@ -45,7 +45,7 @@ class GeneratedQp:
             project[name] += folder.joinpath(f"append_to_{name}").read_text("utf-8")
         file = compiled(project)
         self.library = HostLibrary(file, values, "f64")
-        self._reader = ctypes.CDLL(str(file))
+        self._reader = self.library.functions
         self._reader.reader_prepare.restype = ctypes.c_double
         self.inputs = inputs
         self._state = ctypes.create_string_buffer(self.library.state_bytes)

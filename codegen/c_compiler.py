@@ -1,0 +1,98 @@
+"""The C compiler of this machine, and a generated project compiled by it into a shared library.
+
+All numbers of a vehicle are in one file, `DATA`. The others depend on sizes and constants only:
+they are compiled into one relocatable object, with which that file is linked.
+"""
+
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+
+from qpmpc.errors import QpmpcError
+
+# -w: a new compiler's warnings must not stop a user; the tests check warnings
+COMPILE = "-O3 -std=c99 -w -ffp-contract=off -fPIC -Iosqp -Iosqp/inc/public -Iosqp/inc/private"
+FLAGS = f"{COMPILE} -shared -Wl,-Bsymbolic"
+RELOCATABLE = f"{COMPILE} -r -nostdlib"
+DATA = "mpc_data.c"
+NEEDS_NONE = "mh_qp.implementation=python needs none"
+
+
+class CodegenError(QpmpcError):
+    """A generated controller could not be built or does not fit its caller."""
+
+
+def compiler() -> str | None:
+    """Return the C compiler of this machine: $CC, cc, gcc or clang; None if there is none."""
+    names = [os.environ.get("CC", ""), "cc", "gcc", "clang"]
+    return next((found for name in names if name and (found := shutil.which(name))), None)
+
+
+@cache
+def version(command: str, size: int, modified_ns: int) -> bytes:
+    """Return what a compiler says of itself; its file may be a wrapper that stays the same."""
+    return subprocess.run([command, "--version"], capture_output=True, check=False).stdout
+
+
+def library_of(command: str, files: Mapping[str, str], common: Path | None = None) -> bytes:
+    """Return the content of the shared library of all sources, by name.
+
+    Parameters
+    ----------
+    common : object made by `common_object`; only `DATA` is then compiled
+
+    Raises
+    ------
+    CodegenError
+        If the compiler fails.
+    """
+    objects = [] if common is None else [str(common)]
+    sources = _sources(files) if common is None else [DATA]
+    return _made(command, files, [*FLAGS.split(), *objects, *sources, "-lm"])
+
+
+def common_object(command: str, files: Mapping[str, str]) -> bytes:
+    """Return the content of the relocatable object of all sources but `DATA`.
+
+    Raises
+    ------
+    CodegenError
+        If the compiler fails.
+    """
+    sources = [name for name in _sources(files) if name != DATA]
+    return _made(command, files, [*RELOCATABLE.split(), *sources])
+
+
+def _sources(files: Mapping[str, str]) -> list[str]:
+    return sorted(name for name in files if name.endswith(".c"))
+
+
+def _made(command: str, files: Mapping[str, str], arguments: list[str]) -> bytes:
+    """Write what the sources among the arguments may need, compile, and return what was made."""
+    try:
+        with tempfile.TemporaryDirectory() as scratch:
+            folder = Path(scratch)
+            for name, text in files.items():
+                if name.endswith(".h") or name in arguments:
+                    (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                    (folder / name).write_text(text, "utf-8")
+            result = subprocess.run(
+                [command, "-o", "made", *arguments],
+                cwd=folder,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                check=False,
+            )
+            made = folder / "made"
+            content = made.read_bytes() if made.exists() and not result.returncode else b""
+    except OSError as error:
+        raise CodegenError(f"C compiler {command} cannot be run: {error}; {NEEDS_NONE}") from error
+    if not content:
+        first = next(iter(result.stderr.strip().splitlines()), "no library was built")
+        raise CodegenError(f"C compiler {command} failed: {first}; {NEEDS_NONE}")
+    return content
