@@ -98,7 +98,9 @@ def write_text(file: Path, content: str) -> None:
     write_bytes(file, content.encode())
 
 
-def replace_file(file: Path, content: bytes, mode: int | None = None) -> None:
+def replace_file(
+    file: Path, content: bytes, mode: int | None = None, durable: bool = False
+) -> None:
     """Put a new file in the place of any of that name, in one step.
 
     Parameters
@@ -106,6 +108,7 @@ def replace_file(file: Path, content: bytes, mode: int | None = None) -> None:
     file : in an existing folder; not a link
     content : of the file
     mode : its permissions; those of any new file if None
+    durable : whether it shall be complete even after a power failure, which takes longer
     """
     # a name that nobody can guess, and "x": nothing that is there already is opened
     temporary = file.with_name(f".{secrets.token_hex(8)}.tmp")
@@ -116,9 +119,14 @@ def replace_file(file: Path, content: bytes, mode: int | None = None) -> None:
                 if mode is not None:
                     os.fchmod(stream.fileno(), mode)
                 stream.write(content)
+                if durable:
+                    stream.flush()
+                    os.fsync(stream.fileno())
             temporary.replace(file)
         finally:
             temporary.unlink(missing_ok=True)
+        if durable:
+            _sync_folder(file.parent)
     except OSError as error:  # of the file that the user knows, not of the temporary one
         raise OSError(error.errno, error.strerror, str(file)) from error
 
@@ -195,3 +203,12 @@ def _descriptor(file: Path) -> int | None:
             break
         here = here.parent / here.readlink()
     return None
+
+
+def _sync_folder(folder: Path) -> None:
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # some network file systems do not sync folders
+            os.fsync(handle)
+    finally:
+        os.close(handle)

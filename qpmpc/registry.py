@@ -227,6 +227,16 @@ def check_sections(
         settings.of(section, model())  # refuses wrong settings
 
 
+def reads(controller: str, key: str) -> bool:
+    """Whether a setting, or the ``forecast``, has an effect on a controller of this name.
+
+    Controllers of somebody else's may read any of them.
+    """
+    if controller not in _READS or key.partition(".")[0] in Vehicle.model_fields:
+        return True
+    return any(key == part or key.startswith(f"{part}.") for part in _READS[controller])
+
+
 def without_effect(settings: Mapping[str, object], controllers: Sequence[ControllerLike]) -> str:
     """Say which settings of shipped controllers reach none of those that will run.
 
@@ -235,18 +245,17 @@ def without_effect(settings: Mapping[str, object], controllers: Sequence[Control
     if not all(isinstance(what, str) and what in _READS for what in controllers):
         return ""
     names = [what for what in controllers if isinstance(what, str)]
-    read = [*Vehicle.model_fields, *(part for name in names for part in _READS[name])]
-    idle = sorted(key for key in settings if not key.startswith(tuple(f"{part}." for part in read)))
+    idle = sorted(key for key in settings if not any(reads(name, key) for name in names))
     return f"no effect on {', '.join(names)}: {', '.join(idle)}" if idle else ""
 
 
-# Settings that shipped controllers read, by the beginning of their names; the rules are the last
-# rung of most.
+# Settings that shipped controllers read, by the beginning of their names, and whether they read
+# the forecast; the rules are the last rung of most.
 _READS = {
-    "mh-qp": ("mh_qp", "rule_based"),
-    "mh-qp-paper": ("mh_qp_paper", "rule_based"),
-    "baseline-mpc": ("baseline_mpc", "rule_based"),
-    "mh-nlp": ("mh_qp.horizon", "mh_qp.qp", "rule_based"),
+    "mh-qp": ("mh_qp", "rule_based", "forecast"),
+    "mh-qp-paper": ("mh_qp_paper", "rule_based", "forecast"),
+    "baseline-mpc": ("baseline_mpc", "rule_based", "forecast"),
+    "mh-nlp": ("mh_qp.horizon", "mh_qp.qp", "rule_based", "forecast"),
     "rule-based": ("rule_based",),
     "ecms": ("ecms", "rule_based"),
     "dp": ("dp",),

@@ -1,13 +1,24 @@
 """Output of commands: results, notes and progress."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TaskProgressColumn,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.text import Text
 
 from qpmpc.cli.inputs import STDOUT
 from qpmpc.cli.stdout import to_stderr
@@ -89,3 +100,47 @@ def progress_bar(jobs: int) -> Iterator[ProgressBar]:
         ) as progress,
     ):
         yield ProgressBar(progress, jobs)
+
+
+class _Pace(ProgressColumn):
+    """Runs per second, failures and time left, from the runs that were made in this session."""
+
+    def render(self, task: Task) -> Text:
+        """Return the text of a task whose field `begun` is the number that was there already."""
+        made = task.completed - task.fields["begun"]
+        seconds = task.elapsed or 0.0
+        failed = task.fields["failed"]
+        parts = [f"{failed} failed"] if failed else []
+        if made and seconds:
+            left = (task.remaining or 0.0) * seconds / made
+            parts = [
+                f"{made / seconds:.3g} runs/s",
+                *parts,
+                f"{timedelta(seconds=round(left))} left",
+            ]
+        return Text(", ".join(parts))
+
+
+@contextmanager
+def study_progress() -> Iterator[Callable[[int, int, int], None]]:
+    """Show the progress of a study while the block runs: called with runs done, all and failed."""
+    console = Console(stderr=True)
+    with (
+        to_stderr(),
+        Progress(
+            BarColumn(),
+            MofNCompleteColumn(),
+            _Pace(),
+            console=console,
+            transient=True,
+            disable=not console.is_terminal,
+        ) as bar,
+    ):
+        task = bar.add_task("", total=None, begun=0, failed=0)
+
+        def report(done: int, total: int, failed: int) -> None:
+            if bar.tasks[0].total is None:
+                bar.update(task, begun=done)
+            bar.update(task, completed=done, total=total, failed=failed)
+
+        yield report

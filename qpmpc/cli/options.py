@@ -51,6 +51,15 @@ InjectOption = Annotated[
         show_default=False,
     ),
 ]
+ForecastOption = Annotated[
+    str | None,
+    typer.Option(
+        "--forecast",
+        metavar="MODEL[:SEED]",
+        help="Let the long horizon see a wrong forecast; a wrong model lists all.",
+        show_default=False,
+    ),
+]
 OutOption = Annotated[
     Path | None,
     typer.Option("--out", metavar="DIR", help="Write files into this folder.", show_default=False),

@@ -24,6 +24,7 @@ NOISE_SHARE, NOISE_CORRELATION_S = 0.15, 20.0
 STRETCH_SHARE = 0.05
 SHIFT_S = 10.0
 STOP_SPREAD = 0.5
+SEED_DIGITS = 18
 BURN_IN = 10  # correlation times after which the noise no longer depends on its start
 
 
@@ -111,6 +112,22 @@ MODELS: dict[str, Model] = {
     "another day": another_day,
     "combined": combined,
 }
+
+
+def parse_forecast(text: str) -> tuple[str, int]:
+    """Split ``MODEL[:SEED]``; the seed is 0 if there is none.
+
+    Raises
+    ------
+    InputError
+        If there is no such model, or the seed is no integer from 0 on.
+    """
+    model, colon, seed = text.partition(":")
+    if model not in MODELS:
+        raise InputError(f"unknown forecast error {model!r}: use one of {', '.join(MODELS)}")
+    if colon and not (seed.isascii() and seed.isdecimal() and len(seed) <= SEED_DIGITS):
+        raise InputError(f"forecast {text!r}: the seed must be an integer, 0 or more")
+    return model, int(seed or 0)
 
 
 def forecast(cycle: Cycle, vehicle: Vehicle, model: str, seed: int) -> Trace:

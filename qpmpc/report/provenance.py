@@ -13,15 +13,19 @@ PACKAGES = ("numpy", "scipy", "osqp")
 
 def provenance() -> dict[str, str]:
     """Return the data needed to repeat the result or to judge its step times."""
-    packages = {name: _version(name) for name in PACKAGES}
     return {
         "qpmpc-iptm": __version__,
         "Python": platform.python_version(),
-        **packages,
+        **package_versions(),
         "processor": f"{_processor()}, {os.cpu_count()} logical cores",
         "system": f"{platform.system()} {platform.machine()}",
         "made": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
     }
+
+
+def package_versions() -> dict[str, str]:
+    """Return the versions of the packages that do the arithmetic."""
+    return {name: _version(name) for name in PACKAGES}
 
 
 def _version(name: str) -> str:

@@ -1,0 +1,1 @@
+"""Studies: many runs over cycles, vehicles, settings, controllers, forecasts and faults."""

@@ -1,0 +1,85 @@
+"""The processes of an existing Dask cluster."""
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from contextlib import suppress
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any, TypeVar
+
+from qpmpc.errors import InputError, QpmpcError
+
+Result = TypeVar("Result")
+
+REACH_S = 10.0  # in which a scheduler answers
+WORKERS_S = 30.0  # in which its first worker is there
+
+
+class ClusterWorkers:
+    """Workers of a scheduler; those that come later take part too.
+
+    Parameters
+    ----------
+    address : of the scheduler, such as ``tcp://192.0.2.7:8786``
+
+    Raises
+    ------
+    InputError
+        If dask is not installed, or no scheduler answers, or it has no worker.
+    """
+
+    def __init__(self, address: str) -> None:
+        if find_spec("distributed") is None:
+            raise InputError("a scheduler needs dask: pip install 'qpmpc-iptm[sweep]'")
+        distributed: Any = import_module("distributed")
+        self._address, self._distributed = address, distributed
+        _quiet()
+        try:
+            self._client = distributed.Client(address, timeout=REACH_S, set_as_default=False)
+        except (OSError, TimeoutError, ValueError) as error:
+            reason = " ".join(str(error).split()) or type(error).__name__
+            raise InputError(f"scheduler {address}: cannot be reached: {reason}") from None
+        try:
+            self._client.wait_for_workers(1, timeout=WORKERS_S)
+        except TimeoutError:
+            self._client.close()
+            raise InputError(
+                f"scheduler {address}: no worker in {WORKERS_S:g} s; start some with: "
+                f"dask worker {address}"
+            ) from None
+        self._executor = self._client.get_executor(pure=False)
+
+    @property
+    def slots(self) -> int:
+        """See `Workers`."""
+        return max(1, sum(self._client.nthreads().values()))
+
+    def submit(self, function: Callable[[Any], Result], batch: Any) -> Future[Result]:
+        """See `Workers`."""
+        future: Future[Result] = self._executor.submit(function, batch)
+        return future
+
+    def died(self, error: BaseException) -> bool:
+        """See `Workers`.
+
+        Raises
+        ------
+        QpmpcError
+            If the scheduler is gone.
+        """
+        if self._client.status != "running":
+            raise QpmpcError(f"scheduler {self._address} is gone; --resume goes on later") from None
+        return isinstance(error, self._distributed.scheduler.KilledWorker)
+
+    def close(self) -> None:
+        """See `Workers`."""
+        with suppress(Exception):  # whatever state the connection is in
+            self._executor.shutdown(wait=False)
+            self._client.close(timeout=2)
+
+
+def _quiet() -> None:
+    """Keep the client's log off the terminal: what matters is raised."""
+    import logging
+
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)

@@ -1,0 +1,148 @@
+"""Results of a study, read from its folder, finished or not."""
+
+import json
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from qpmpc.errors import InputError
+from qpmpc.report.provenance import provenance
+from qpmpc.results import OPTIMUM, REFERENCE
+from qpmpc.settings import validated
+from qpmpc.study.columns import SETTING, schema
+from qpmpc.study.definition import OF_RUN, Parameters, Study
+from qpmpc.study.journal import rows_in
+from qpmpc.study.store import JOURNAL, SESSIONS, STUDY, part_files
+
+if TYPE_CHECKING:
+    from pandas import DataFrame, Series
+
+
+@dataclass(frozen=True)
+class StudyResults:
+    """The folder of a study.
+
+    Parameters
+    ----------
+    folder : as `sweep` left it
+
+    Raises
+    ------
+    InputError
+        If it holds no study.
+    """
+
+    folder: Path
+
+    @cached_property
+    def study(self) -> Study:
+        """The study, as it was run."""
+        file = self.folder / STUDY
+        try:
+            data = json.loads(file.read_text("utf-8"))["study"]
+        except FileNotFoundError:
+            raise InputError(f"{self.folder}: holds no study ({STUDY})") from None
+        except (OSError, ValueError, KeyError, TypeError):
+            raise InputError(f"{file}: cannot be read as a study's") from None
+        return validated(Study, data, os.fspath(file))
+
+    @property
+    def name(self) -> str:
+        """Name of the study."""
+        return self.study.name
+
+    @property
+    def description(self) -> str:
+        """What it asks."""
+        return self.study.description
+
+    @property
+    def seed(self) -> int:
+        """Seed of its samples."""
+        return self.study.seed
+
+    @cached_property
+    def runs(self) -> int:
+        """Number of runs planned."""
+        return self.study.count
+
+    @property
+    def text(self) -> str:
+        """The study as JSON."""
+        return self.study.model_dump_json(indent=2, exclude_none=True, exclude_defaults=True)
+
+    @property
+    def varied(self) -> list[str]:
+        """Columns with more than one value."""
+        return [key if key in OF_RUN else SETTING + key for key in self.study.varied]
+
+    @cached_property
+    def provenance(self) -> dict[str, str]:
+        """Versions and machine of this process, and the time of the whole; rows have their own."""
+        sessions = [json.loads(line) for line in self._sessions.splitlines()]
+        if not sessions:
+            return provenance()
+        elapsed_s = sum(float(each["elapsed_s"]) for each in sessions)
+        workers = ", ".join(dict.fromkeys(str(each["workers"]) for each in sessions))
+        return {**provenance(), "workers": workers, "elapsed_s": f"{elapsed_s:.1f}"}
+
+    @property
+    def _sessions(self) -> str:
+        try:
+            return (self.folder / SESSIONS).read_text("utf-8")
+        except OSError:
+            return ""
+
+    def frame(self) -> "DataFrame":
+        """Return all rows, sorted by `run`, with two columns more.
+
+        fuel_above_dp_percent = 100 (m / m_dp - 1),   saving_vs_rule_percent = 100 (1 - m / m_rule)
+
+        with m the SOC-balanced fuel, and the others' of the same `trip_hash`: of several runs of
+        dp the least, of several of the rules the first. NaN where one of the two is missing or not
+        comparable.
+        """
+        import pandas as pd
+        import pyarrow as pa
+        import pyarrow.parquet as parquet
+
+        form = schema(self.study)
+        tables = [parquet.read_table(file, schema=form) for file in part_files(self.folder)]
+        latest = [{**row} for row in rows_in(self.folder / JOURNAL)]
+        table = pa.concat_tables([*tables, pa.Table.from_pylist(latest, form)])
+        frame: DataFrame = table.to_pandas()
+        for key in self.study.settings:
+            if self.study.kind_of(key) is int:  # which pandas makes floats of, beside nothing
+                frame[SETTING + key] = pd.array(table[SETTING + key].to_pylist(), dtype="Int64")
+        frame = frame.drop_duplicates("run").sort_values("run", ignore_index=True)
+        balanced = frame["fuel_soc_balanced_g"].where(frame["comparable"].eq(True))
+        by_trip = pd.DataFrame({"trip": frame["trip_hash"], "m": balanced})
+        of_dp = by_trip[frame["controller"] == OPTIMUM].groupby("trip")["m"]
+        of_rules = by_trip[frame["controller"] == REFERENCE].groupby("trip")["m"]
+        optimum, rule = (frame["trip_hash"].map(m) for m in (of_dp.min(), of_rules.first()))
+        frame["fuel_above_dp_percent"] = 100.0 * (balanced / optimum - 1.0)
+        frame["saving_vs_rule_percent"] = 100.0 * (1.0 - balanced / rule)
+        return frame
+
+
+def parameters_of(row: "Series[Any]") -> Parameters:
+    """Return the parameters of a run from its row in a frame."""
+    import pandas as pd
+
+    settings = {
+        name.removeprefix(SETTING): value
+        for name, value in row.astype(object).to_dict().items()
+        if name.startswith(SETTING) and not pd.isna(value)
+    }
+    return Parameters(
+        run=int(row["run"]),
+        cycle=row["cycle"],
+        vehicle=row["vehicle"],
+        controller=row["controller"],
+        forecast=row["forecast"],
+        faults=row["faults"] if isinstance(row["faults"], str) else None,
+        seed=int(row["seed"]),
+        settings=settings,
+    )

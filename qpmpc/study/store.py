@@ -1,0 +1,203 @@
+"""Results of a study on disk: a journal of the latest rows, and Parquet in parts.
+
+A run is finished when its row is in the journal. Every `PART_ROWS` rows, and at the end, the
+journal becomes a part. A run that is in both, because the process died between two steps, is read
+once.
+"""
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import suppress
+from fcntl import LOCK_EX, LOCK_NB, flock
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from qpmpc.errors import InputError
+from qpmpc.files import check_folder, json_text, replace_file, write_bytes, write_text
+from qpmpc.report.trajectory_csv import trajectory_csv
+from qpmpc.results import Run
+from qpmpc.study.columns import schema
+from qpmpc.study.definition import Study
+from qpmpc.study.journal import Journal, Row, finite, rows_in
+
+STUDY, SESSIONS, JOURNAL, LOCK = "study.json", "sessions.jsonl", "journal.jsonl", "lock"
+PARTS, TRAJECTORIES = "runs", "trajectories"
+PART_ROWS = 2_000
+
+
+class Store:
+    """The folder of a study that is being run, by this process alone.
+
+    Parameters
+    ----------
+    folder : is made if it is not there
+    study : whose results it holds
+    identity : what results depend on, by its name in messages
+    resume : go on with what is there
+
+    Attributes
+    ----------
+    finished : 1 at the number of each run that it has, 0 at the others
+    failed : number of those that failed
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written to, holds a study and `resume` is false, holds another
+        study, or is in use.
+    """
+
+    def __init__(
+        self, folder: Path, study: Study, identity: dict[str, str], resume: bool = False
+    ) -> None:
+        check_folder(folder, "--out")
+        self.folder, self._schema = folder, schema(study)
+        held = folder / STUDY
+        if held.exists():
+            _check_same(held, identity, resume)
+        folder.mkdir(parents=True, exist_ok=True)
+        self._lock = _locked(folder)
+        try:
+            if not held.exists():
+                data = {"study": study.model_dump(exclude_none=True), "identity": identity}
+                write_text(held, json_text(data))
+            (folder / PARTS).mkdir(exist_ok=True)
+            self.finished = bytearray(study.combinations)
+            self.failed = 0
+            for number, error in _in_parts(folder):
+                self._note(number, error)
+            self._rows = [r for r in rows_in(folder / JOURNAL) if not self.finished[r["run"]]]
+            for row in self._rows:
+                self._note(row["run"], row.get("error"))
+            self._journal = Journal(folder / JOURNAL, self._rows)
+        except BaseException:
+            if not held.exists():  # nothing was begun: leave nothing
+                (folder / LOCK).unlink(missing_ok=True)
+                with suppress(OSError):
+                    folder.rmdir()
+            os.close(self._lock)
+            raise
+
+    def add(self, row: Row) -> None:
+        """Record a finished run.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written; what was written before stays.
+        """
+        self._rows.append(row)  # first: if Ctrl-C comes between, `close` still writes it
+        try:
+            self._journal.add(row)
+        except OSError:
+            self._rows.pop()
+            raise
+        self._note(row["run"], row.get("error"))
+        if len(self._rows) >= PART_ROWS:
+            self._make_part()
+            self._journal.close()
+            self._journal = Journal(self.folder / JOURNAL, [])
+
+    def add_trajectory(self, run: int, content: bytes) -> None:
+        """Write the trajectory of a run: before its row, so that a row has its trajectory."""
+        write_bytes(self.folder / TRAJECTORIES / f"run-{run:07d}.parquet", content)
+
+    def close(self) -> None:
+        """Make a part of what there is, and let others use the folder."""
+        try:
+            self._journal.close()
+            self._make_part()
+            with suppress(FileNotFoundError):
+                (self.folder / JOURNAL).unlink()
+        finally:
+            os.close(self._lock)
+
+    def add_session(self, runs: int, seconds: float, workers: int) -> None:
+        """Note how long this process took for its runs."""
+        session = {"runs": runs, "elapsed_s": seconds, "workers": workers}
+        with (self.folder / SESSIONS).open("a", encoding="utf-8") as file:
+            file.write(json.dumps(session) + "\n")
+
+    def _make_part(self) -> None:
+        if not self._rows:
+            return
+        rows = sorted(map(finite, self._rows), key=lambda row: int(row["run"]))
+        numbers = [int(file.stem.partition("-")[2]) for file in part_files(self.folder)]
+        name = f"part-{max(numbers, default=-1) + 1:05d}.parquet"
+        content = _parquet(rows, self._schema)
+        replace_file(self.folder / PARTS / name, content, durable=True)
+        self._rows = []
+
+    def _note(self, number: int, error: str | None) -> None:
+        self.failed += error is not None and not self.finished[number]
+        self.finished[number] = 1
+
+
+def part_files(folder: Path) -> list[Path]:
+    """Return the parts of a study's folder, in the order in which they were written."""
+    return sorted((folder / PARTS).glob("part-*.parquet"))
+
+
+def trajectory_bytes(run: Run) -> bytes:
+    """Return a trajectory as a Parquet file, with the columns of its CSV file."""
+    import pyarrow.csv as csv
+    import pyarrow.parquet as parquet
+
+    into = BytesIO()
+    table = csv.read_csv(BytesIO(trajectory_csv(run).encode()))
+    parquet.write_table(table, into, compression="zstd")
+    return into.getvalue()
+
+
+def _in_parts(folder: Path) -> Iterator[tuple[int, str | None]]:
+    """Yield number and error of each run in the parts."""
+    import pyarrow.parquet as parquet
+    from pyarrow import ArrowException
+
+    for file in part_files(folder):
+        try:
+            table = parquet.read_table(file, columns=["run", "error"])
+        except (ArrowException, OSError) as error:
+            raise InputError(
+                f"{file}: damaged: delete it, and --resume repeats its runs"
+            ) from error
+        yield from zip(table["run"].to_pylist(), table["error"].to_pylist(), strict=True)
+
+
+def _parquet(rows: list[Row], columns: Any) -> bytes:
+    import pyarrow as pa
+    import pyarrow.parquet as parquet
+
+    into = BytesIO()
+    parquet.write_table(pa.Table.from_pylist(rows, columns), into, compression="zstd")
+    return into.getvalue()
+
+
+def _check_same(file: Path, identity: dict[str, str], resume: bool) -> None:
+    if not resume:
+        raise InputError(
+            f"--out {file.parent}: holds a study: --resume goes on with it, or give another folder"
+        )
+    try:
+        held = json.loads(file.read_text("utf-8"))["identity"]
+        differ = [what for what, now in identity.items() if held.get(what) != now]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"{file}: cannot be read as a study's") from error
+    if differ:
+        then = f" (then {held['versions']}; now {identity['versions']})"
+        raise InputError(
+            f"--resume: {file.parent} was made with other {' and '.join(differ)}"
+            f"{then if 'versions' in differ else ''}: give another folder"
+        )
+
+
+def _locked(folder: Path) -> int:
+    handle = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+    try:
+        flock(handle, LOCK_EX | LOCK_NB)
+    except OSError:
+        os.close(handle)
+        raise InputError(f"--out {folder}: another process is running this study") from None
+    return handle

@@ -1,0 +1,154 @@
+"""Whole studies in real processes: values, failures, kill and Ctrl-C."""
+
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as parquet
+import pytest
+from pandas.testing import assert_frame_equal
+from quick_study import QUICK, as_toml, values
+
+import qpmpc
+from qpmpc.study.columns import columns
+from qpmpc.study.definition import as_study
+from qpmpc.study.store import JOURNAL, part_files
+from qpmpc.study.sweep import sweep
+
+KILLS = 10
+QPMPC = [sys.executable, "-m", "qpmpc"]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The study without interruption."""
+    folder = tmp_path_factory.mktemp("whole") / "out"
+    sweep(QUICK, folder, workers=2)
+    return folder
+
+
+def test_a_run_of_a_study_is_that_of_simulate(whole: Path) -> None:
+    frame = values(whole)
+    assert frame["error"].isna().all()
+    assert frame["run"].tolist() == list(range(60))
+    row = frame.iloc[37]
+    settings = {k.removeprefix("set."): row[k] for k in frame if k.startswith("set.")}
+    run = qpmpc.simulate(row["cycle"], row["controller"], row["vehicle"], settings=settings)
+    assert run.fuel_g == row["fuel_g"]
+    assert run.summary()["violations"]["t_cl_degc"] == row["violations.t_cl_degc"]
+
+
+def test_every_figure_of_a_run_has_a_column(whole: Path) -> None:
+    from qpmpc.study.columns import flat
+
+    known = columns(as_study({"name": "a", "fixed": {"cycle": "nycc"}}))
+    found = flat(qpmpc.simulate("nycc", "mh-qp").summary())
+    assert {key for key in found if not key.startswith("flags.")} <= set(known)
+    table = parquet.read_table(part_files(whole)[0])
+    assert set(table.column_names) >= set(known)
+
+
+def test_failures_are_recorded_and_the_others_go_on(tmp_path: Path) -> None:
+    """Dynamic programming refuses a start below the coolant limit; the rules do not."""
+    study = {
+        "name": "cold",
+        "fixed": {"cycle": "nycc", "dp.soc_step": 0.02, "dp.t_cl_step_k": 5, "dp.refinement": 1},
+        "grid": {"controller": ["dp", "rule-based"], "trip.t_cl_init_degc": [30, 50]},
+    }
+    frame = values(sweep(study, tmp_path / "out", workers=1).folder)
+    assert frame["error"].notna().tolist() == [True, False, False, False]
+    assert "t_cl_init_degc" in frame["error"][0]
+    assert frame["fuel_g"].isna().tolist() == [True, False, False, False]
+
+
+def test_trajectories_are_kept_on_request(tmp_path: Path) -> None:
+    study = {
+        "name": "a",
+        "trajectories": True,
+        "fixed": {"cycle": "nycc", "controller": "rule-based", "rule_based.balance": False},
+    }
+    results = sweep(study, tmp_path / "out", workers=1)
+    table = parquet.read_table(tmp_path / "out" / "trajectories" / "run-0000000.parquet")
+    fuel_g = results.frame()["fuel_g"][0]
+    assert sum(f for f in table["fuel_g"].to_pylist() if f) == pytest.approx(fuel_g, rel=1e-12)
+
+
+def started(file: Path, folder: Path, **more: Any) -> "subprocess.Popen[str]":
+    command = [*QPMPC, "sweep", str(file), "--out", str(folder), "--resume"]
+    return subprocess.Popen(
+        command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, **more
+    )
+
+
+def wait_for(condition: Callable[[], bool], process: "subprocess.Popen[str]") -> None:
+    until = time.monotonic() + 60.0
+    while not condition() and process.poll() is None and time.monotonic() < until:
+        time.sleep(0.01)
+
+
+def finished(folder: Path) -> int:
+    """Runs on disk, seen from outside."""
+    rows = sum(parquet.read_metadata(file).num_rows for file in part_files(folder))
+    journal = folder / JOURNAL
+    return rows + (journal.read_bytes().count(b"\n") if journal.exists() else 0)
+
+
+@pytest.mark.slow
+def test_killed_ten_times_and_gone_on_with_it_is_the_same_study(
+    tmp_path: Path, whole: Path
+) -> None:
+    file, folder = as_toml(QUICK, tmp_path / "study.toml"), tmp_path / "out"
+    draw = random.Random(12)
+    for _ in range(KILLS):
+        before = finished(folder) if folder.exists() else 0
+        process = started(file, folder)
+        some = draw.randint(1, 5)
+        wait_for(lambda n=before + some: folder.exists() and finished(folder) >= n, process)
+        time.sleep(draw.random() * 0.05)
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+        assert finished(folder) >= before
+    process = started(file, folder)
+    assert "Traceback" not in process.communicate()[1]
+    assert process.returncode == 0
+    every = [n for part in part_files(folder) for n in parquet.read_table(part)["run"].to_pylist()]
+    assert sorted(every) == list(range(60))  # none lost, none twice
+    assert_frame_equal(values(folder), values(whole), check_exact=True)
+
+
+def test_ctrl_c_ends_it_with_all_that_was_finished(tmp_path: Path) -> None:
+    file, folder = as_toml(QUICK, tmp_path / "study.toml"), tmp_path / "out"
+    process = started(file, folder, start_new_session=True)
+    wait_for(lambda: folder.exists() and finished(folder) >= 3, process)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: the workers get it too
+    said = process.communicate(timeout=20)[1]
+    assert said == "qpmpc: interrupted\n"
+    assert process.returncode == 130
+    assert not (folder / JOURNAL).exists()
+    assert 3 <= finished(folder) < 60
+    assert values(folder)["error"].isna().all()
+
+
+def test_a_full_disk_is_one_line(tmp_path: Path) -> None:
+    """A limit of the size of files gives the same error from the kernel as a disk that is full."""
+    file, folder = as_toml(QUICK, tmp_path / "study.toml"), tmp_path / "out"
+
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+
+    process = started(file, folder, preexec_fn=limited)
+    said = process.communicate(timeout=60)[1]
+    assert process.returncode == 1
+    assert said.count("\n") == 1
+    assert JOURNAL in said
+    there = finished(folder)
+    assert there > 0
+    assert started(file, folder).wait(60) == 0
+    assert finished(folder) == 60
