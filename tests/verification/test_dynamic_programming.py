@@ -30,7 +30,8 @@ from qpmpc.verification.dynamic_programming.problem import build_problem
 
 VEHICLE = load_vehicle()
 PLANT = Plant(VEHICLE)
-MAPS = build_problem(load_cycle("nycc"), VEHICLE).maps
+NYCC = build_problem(load_cycle("nycc"), VEHICLE)
+MAPS, CONSTANTS = NYCC.maps, NYCC.constants
 COARSE = DpSettings(soc_step=0.004, t_cl_step_k=1.0, power_step_w=1000.0, refinement=2, threads=1)
 QUICK = DpSettings.quick().model_copy(update={"threads": 1})
 # for a drive of seconds, where a cell is a large part of the energy
@@ -117,11 +118,13 @@ def test_compiled_step_is_the_plants(
     state, flows = PLANT.step(
         PlantState(soc, t_cl), Command(share is not None, power), demand, speed
     )
-    fuel = 0.0 if share is None else alpha(MAPS, t_cl) * hot_fuel_g(MAPS, power)
-    t_end = compiled_next_t_cl(MAPS, t_cl, fuel, power, losses_w(MAPS, t_cl, speed))
+    fuel = 0.0 if share is None else alpha(CONSTANTS, t_cl) * hot_fuel_g(MAPS, power)
+    t_end = compiled_next_t_cl(CONSTANTS, t_cl, fuel, power, losses_w(CONSTANTS, t_cl, speed))
     assert fuel == pytest.approx(flows.fuel_g, rel=1e-12)
     assert t_end == pytest.approx(state.t_cl_degc, rel=1e-12)
-    assert compiled_next_soc(MAPS, soc, demand, power) == pytest.approx(state.soc, abs=1e-13)
+    assert compiled_next_soc(MAPS, CONSTANTS, soc, demand, power) == pytest.approx(
+        state.soc, abs=1e-13
+    )
 
 
 # optimality

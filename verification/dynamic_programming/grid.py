@@ -81,10 +81,10 @@ class Grid:
         cls, problem: Problem, soc_step: float, t_cl_step_k: float, power_step_w: float
     ) -> Self:
         """Cover everything within the limits."""
-        maps, times = problem.maps, problem.steps + 1
+        constants, times = problem.constants, problem.steps + 1
         return cls(
-            Axis.full(maps.soc_min, maps.soc_max, soc_step, times),
-            Axis.full(maps.t_cl_min_degc, maps.t_cl_max_degc, t_cl_step_k, times),
+            Axis.full(constants.soc_min, constants.soc_max, soc_step, times),
+            Axis.full(constants.t_cl_min_degc, constants.t_cl_max_degc, t_cl_step_k, times),
             power_step_w,
         )
 
@@ -98,11 +98,15 @@ class Grid:
         power_step_w: float,
     ) -> Self:
         """Cover a tube around a path."""
-        maps = problem.maps
+        constants = problem.constants
         return cls(
-            Axis.around(path.soc, half_width[0], maps.soc_min, maps.soc_max, step[0]),
+            Axis.around(path.soc, half_width[0], constants.soc_min, constants.soc_max, step[0]),
             Axis.around(
-                path.t_cl_degc, half_width[1], maps.t_cl_min_degc, maps.t_cl_max_degc, step[1]
+                path.t_cl_degc,
+                half_width[1],
+                constants.t_cl_min_degc,
+                constants.t_cl_max_degc,
+                step[1],
             ),
             power_step_w,
         )

@@ -83,7 +83,7 @@ def _solution(
     vehicle, battery = problem.plant.vehicle, problem.plant.battery
     energy_j = battery.open_circuit(path.soc[:-1]) * battery.charge_c
     with np.errstate(divide="ignore"):
-        efficiency = energy_j / (path.soc_costate_g * problem.maps.lhv_j_per_g)
+        efficiency = energy_j / (path.soc_costate_g * problem.constants.lhv_j_per_g)
     return DpSolution(
         cycle=cycle.name,
         vehicle=vehicle.name,
@@ -95,7 +95,9 @@ def _solution(
         soc_costate_g=path.soc_costate_g,
         soc_efficiency=efficiency,
         t_cl_costate_g_per_k=path.t_cl_costate_g_per_k,
-        heat_costate_g_per_mj=1e6 * path.t_cl_costate_g_per_k / problem.maps.heat_capacity_j_per_k,
+        heat_costate_g_per_mj=1e6
+        * path.t_cl_costate_g_per_k
+        / problem.constants.heat_capacity_j_per_k,
         levels=tuple(levels),
         admissible=path.admissible,
     )

@@ -7,7 +7,7 @@ import numpy as np
 from qpmpc.cycles import Cycle
 from qpmpc.errors import InputError
 from qpmpc.vehicle import Plant, Vehicle, demand_w
-from qpmpc.verification.dynamic_programming.kernels import Bools, Floats, Maps
+from qpmpc.verification.dynamic_programming.kernels import Bools, Constants, Floats, Maps
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Problem:
     Attributes
     ----------
     plant : the plant on which the result is realised
-    maps : its numbers for compiled code
+    maps, constants : its numbers for compiled code
     demand_w, speed_mps : shape (n,)
     power_low_w, power_high_w : engine power with the engine on, shape (n,)
     on_allowed, off_allowed : shape (n,)
@@ -26,6 +26,7 @@ class Problem:
 
     plant: Plant
     maps: Maps
+    constants: Constants
     demand_w: Floats
     speed_mps: Floats
     power_low_w: Floats
@@ -87,11 +88,13 @@ def build_problem(cycle: Cycle, vehicle: Vehicle) -> Problem:
         open_circuit_v=np.array(battery.open_circuit_v),
         resistance_discharge_ohm=np.array(battery.resistance_discharge_ohm),
         resistance_charge_ohm=np.array(battery.resistance_charge_ohm),
+        line_power_w=plant.line.power_w,
+        line_fuel_g_per_s=plant.line.fuel_g_per_s,
+    )
+    constants = Constants(
         charge_c=plant.battery.charge_c,
         power_charge_max_w=battery.power_charge_max_w,
         aux_power_w=battery.aux_power_w,
-        line_power_w=plant.line.power_w,
-        line_fuel_g_per_s=plant.line.fuel_g_per_s,
         cold_k=vehicle.cold_engine.k,
         cold_hot_degc=vehicle.cold_engine.hot_degc,
         cold_span_k=vehicle.cold_engine.span_k,
@@ -107,6 +110,7 @@ def build_problem(cycle: Cycle, vehicle: Vehicle) -> Problem:
     return Problem(
         plant=plant,
         maps=maps,
+        constants=constants,
         demand_w=demand,
         speed_mps=cycle.step_speed_mps,
         power_low_w=low,

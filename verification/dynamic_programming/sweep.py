@@ -17,26 +17,30 @@ from qpmpc.verification.dynamic_programming.trajectory import Trajectory
 Progress = Callable[[float], None]
 
 NODES_WORTH_THREADS = 5_000
+VALUES_BYTES = 400e6
+"""Of the value functions kept: with `DpSettings.quick` all of a trip of two hours (300 MB), and
+every second one of half an hour with the default; two processes then take about 1 GB."""
 
 
 class Sweep:
-    """Bellman recursion on one grid, with memory for O(sqrt(n)) value functions only.
+    """Bellman recursion on one grid.
 
-    The backward pass keeps W_k at every L-th time, L = ceil(sqrt(n)). The forward pass computes
-    the values in between once more, segment by segment, as it needs them.
+    The backward pass keeps W_k at every L-th time, see `segment_length`. The forward pass
+    computes the values in between once more, segment by segment, as it needs them.
     """
 
     def __init__(self, problem: Problem, grid: Grid, threads: int) -> None:
         self.problem = problem
         self.grid = grid
-        self.states = 2 if problem.maps.start_fuel_g > 0.0 else 1
-        self.segment = max(1, ceil(sqrt(problem.steps)))
+        self.states = 2 if problem.constants.start_fuel_g > 0.0 else 1
+        self.segment = segment_length(problem.steps, 8 * self.states * grid.nodes)
         rows = grid.soc.points
         parts = threads if grid.nodes >= NODES_WORTH_THREADS else 1
         bounds = np.linspace(0, rows, parts + 1).astype(int).tolist()
         self.chunks = list(pairwise(bounds))
         self.coast = kernels.coasting_set(
             problem.maps,
+            problem.constants,
             problem.demand_w,
             problem.speed_mps,
             problem.off_allowed,
@@ -47,7 +51,7 @@ class Sweep:
         """Solve and roll out; `progress` receives the finished fraction."""
         n, segment = self.problem.steps, self.segment
         shape = (self.states, *self.grid.shape)
-        total, done = 2 * n, 0
+        total, done = 2 * n - len(range(0, n, segment)), 0
         with ThreadPoolExecutor(len(self.chunks)) as pool:
             value = np.zeros(shape)
             kept = {n: value}
@@ -93,22 +97,32 @@ class Sweep:
         return bool(soc >= self.coast[0][k] - slack and t_cl_degc >= self.coast[1][k] - slack)
 
     def _backward(self, pool: ThreadPoolExecutor, k: int, following: Floats) -> Floats:
-        maps, grid, step = self.problem.maps, self.grid, self.step(k)
+        problem, grid, step = self.problem, self.grid, self.step(k)
         soc_axis, t_axis = grid.soc.nodes(k), grid.t_cl.nodes(k)
         target = grid.lattice(k + 1)
         table = (self.states, step.power_count + 1, len(t_axis))
         fuel: Floats = np.empty(table)
         weight: Floats = np.empty(table)
         column: Cells = np.empty(table, dtype=np.uint32)
+        run_end: Cells = np.empty(table, dtype=np.uint32)
         kernels.temperature_tables(
-            maps, step, t_axis, target, grid.t_cl.points, fuel, column, weight
+            problem.maps,
+            problem.constants,
+            step,
+            t_axis,
+            target,
+            grid.t_cl.points,
+            fuel,
+            column,
+            weight,
+            run_end,
         )
         value = np.empty_like(following)
 
         def rows(first: int, stop: int) -> None:
             kernels.bellman_rows(
-                first, stop, maps, step, soc_axis, t_axis, target,
-                fuel, column, weight, following, value,
+                first, stop, problem.maps, problem.constants, step, soc_axis, t_axis, target,
+                fuel, column, weight, run_end, following, value,
             )  # fmt: skip
 
         jobs = [pool.submit(rows, *chunk) for chunk in self.chunks[1:]]
@@ -116,6 +130,21 @@ class Sweep:
         for job in jobs:
             job.result()
         return value
+
+
+def segment_length(steps: int, value_bytes: int) -> int:
+    """Return the least L whose value functions fit into VALUES_BYTES.
+
+    Every L-th of n and the L - 1 in between at one time make n/L + L; where even the least of
+    these, at sqrt(n), does not fit, that is taken.
+    """
+    least = max(1, ceil(sqrt(steps)))
+    fitting = (
+        length
+        for length in range(1, least)
+        if (ceil(steps / length) + length) * value_bytes <= VALUES_BYTES
+    )
+    return next(fitting, least)
 
 
 class _Forward:
@@ -145,7 +174,14 @@ class _Forward:
         else:
             target = grid.lattice(k + 1)
             cost, on, power, admissible = kernels.best_command(
-                problem.maps, sweep.step(k), (soc, t_cl), state.engine_on, following, target
+                problem.maps,
+                problem.constants,
+                sweep.step(k),
+                soc,
+                t_cl,
+                state.engine_on,
+                following,
+                target,
             )
             command = Command(on, power)
             if k == 0:
@@ -154,7 +190,7 @@ class _Forward:
             lattice = grid.lattice(k)
             row = (soc - lattice.soc_origin) / lattice.soc_spacing
             column = (t_cl - lattice.t_cl_origin) / lattice.t_cl_spacing
-            by_row, by_column = kernels.gradient(value[before], row, column)
+            by_row, by_column = kernels.gradient(value, before, row, column)
             self.soc_costate[k] = -by_row / lattice.soc_spacing
             self.t_cl_costate[k] = -by_column / lattice.t_cl_spacing
         self.state, flows = problem.plant.step(
