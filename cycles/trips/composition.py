@@ -7,7 +7,14 @@ from numpy.typing import NDArray
 
 from qpmpc.cycles.cycle import Floats
 from qpmpc.cycles.trips.draws import Draws
-from qpmpc.cycles.trips.micro_trips import CITY, MOTORWAY, RURAL, SUBURB, draw_closing, draw_micro_trip
+from qpmpc.cycles.trips.micro_trips import (
+    CITY,
+    MOTORWAY,
+    RURAL,
+    SUBURB,
+    draw_closing,
+    draw_micro_trip,
+)
 from qpmpc.cycles.trips.motorway import SHORTEST_S, motorway
 
 ROADS = (CITY, SUBURB, RURAL, MOTORWAY)
@@ -72,7 +79,9 @@ def compose(draws: Draws, kind: str, duration_s: int) -> Wanted:
                 continue
             add(piece[1:], where)
             stop = round(draws.lognormal(STOP_MEDIAN_S[where], STOP_SPREAD))
-            stop = min(max(stop, STOP_S[0]), STOP_S[1], round(STOP_SHARE_MAX * duration_s), left - LEAST_S)
+            stop = min(
+                max(stop, STOP_S[0]), STOP_S[1], round(STOP_SHARE_MAX * duration_s), left - LEAST_S
+            )
             if left >= LEAST_S:  # else the trip is over
                 add(np.zeros(max(stop, 0)), where)
     add(np.zeros(left), where)

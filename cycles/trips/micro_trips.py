@@ -31,7 +31,7 @@ ACCEL_MAX_MPS2 = 2.6
 
 NOISE_SHARE, NOISE_MOST, NOISE_POLE = 0.03, 2.5, 0.9
 """Slow deviations from the stretched trace: sd 3 % of the speed, at most 2.5 sd, correlated over
-some 20 s; left out where they would take the acceleration beyond its bound."""
+some 20 s."""
 
 CUT_FROM, CUT_SHARE = 120, 0.6  # points from which a micro-trip may lose a part, and how often
 CUT_ENDS, CUT_LEAST = 15, 20  # points that are kept at either end, and least that are left out
@@ -93,20 +93,13 @@ def _within_s(piece: Floats, seconds: int) -> tuple[bool, bool]:
 
 
 def _changed(draws: Draws, piece: Floats, steps: int) -> Floats:
-    """Another duration, another speed, and other deviations from it."""
-    factor = 1.0 + draws.uniform(-SPEED_SPREAD, SPEED_SPREAD)
-    speed = _stretched(piece, factor, steps)
-    noise = np.clip(slow_noise(draws, len(speed), NOISE_POLE), -NOISE_MOST, NOISE_MOST)
-    noisy = speed * (1.0 + NOISE_SHARE * noise)
-    return noisy if np.abs(np.diff(noisy)).max() <= ACCEL_MAX_MPS2 else speed
-
-
-def _stretched(piece: Floats, factor_v: float, steps: int) -> Floats:
-    """Another speed and another duration, slower where it would be too brisk."""
-    brisk = float(np.abs(np.diff(piece)).max()) * (len(piece) - 1) / steps
-    factor_v = min(factor_v, ACCEL_MAX_MPS2 / brisk)
+    """Another duration, another speed, and other deviations from it; slower if too brisk."""
     at = np.linspace(0.0, len(piece) - 1.0, steps + 1)
-    return np.asarray(factor_v * np.interp(at, np.arange(float(len(piece))), piece))
+    speed = np.interp(at, np.arange(float(len(piece))), piece)
+    speed *= 1.0 + draws.uniform(-SPEED_SPREAD, SPEED_SPREAD)
+    noise = np.clip(slow_noise(draws, len(speed), NOISE_POLE), -NOISE_MOST, NOISE_MOST)
+    speed *= 1.0 + NOISE_SHARE * noise
+    return np.asarray(speed * min(ACCEL_MAX_MPS2 / np.abs(np.diff(speed)).max(), 1.0))
 
 
 def _cut(draws: Draws, piece: Floats) -> Floats:
