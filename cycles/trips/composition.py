@@ -7,7 +7,14 @@ from numpy.typing import NDArray
 
 from qpmpc.cycles.cycle import Floats
 from qpmpc.cycles.trips.draws import Draws
-from qpmpc.cycles.trips.micro_trips import CITY, MOTORWAY, RURAL, SUBURB, draw_micro_trip
+from qpmpc.cycles.trips.micro_trips import (
+    CITY,
+    MOTORWAY,
+    RURAL,
+    SUBURB,
+    draw_closing,
+    draw_micro_trip,
+)
 from qpmpc.cycles.trips.motorway import SHORTEST_S, motorway
 
 ROADS = (CITY, SUBURB, RURAL, MOTORWAY)
@@ -21,8 +28,11 @@ SHARES = (  # of the types, by the duration below which they hold
 )
 """Short trips are local, long ones are not: assumed."""
 
-STOP_MEDIAN_S, STOP_SPREAD = {CITY: 14.0, SUBURB: 11.0, RURAL: 9.0, MOTORWAY: 9.0}, 0.8
+STOP_MEDIAN_S, STOP_SPREAD = {CITY: 11.0, SUBURB: 10.0, RURAL: 9.0, MOTORWAY: 9.0}, 0.8
 STOP_S = (2, 120)
+STOP_SHARE_MAX = 0.15  # of the trip
+STANDING_S = (3, 12)  # before the first drive, and after the last
+CLOSING_S = 90  # from here on a micro-trip that ends the trip is looked for
 LEAST_S = 24  # what is left of a part is not filled below it
 RURAL_FROM_S, MOTORWAY_FROM_S = 180.0, 240.0
 MOTORWAY_PART_S = (1200.0, 3000.0)  # between stops, on a long way
@@ -43,41 +53,56 @@ def trip_type(duration_s: float, quantile: float) -> str:
 
 def compose(draws: Draws, kind: str, duration_s: int) -> Wanted:
     """Draw the motion of a trip of exactly this duration, at rest at both ends."""
-    speed: list[Floats] = [np.zeros(1)]
-    road: list[NDArray[np.intp]] = [np.zeros(1, dtype=np.intp)]
     parts = _parts(draws, kind, duration_s)
-    road[0][:] = ROADS.index(parts[0][0])
+    speed: list[Floats] = []
+    road: list[NDArray[np.intp]] = []
+    left = duration_s + 1  # points
 
-    def add(piece: Floats, where: str) -> int:
+    def add(piece: Floats, where: str) -> None:
+        nonlocal left
         speed.append(piece)
         road.append(np.full(len(piece), ROADS.index(where)))
-        return len(piece)
+        left -= len(piece)
 
-    left = duration_s - add(np.zeros(2 + draws.integer(8)), parts[0][0])
+    add(np.zeros(_within(STANDING_S, draws)), parts[0][0])
     for number, (where, seconds) in enumerate(parts):
         is_last = number == len(parts) - 1
-        budget = left if is_last else min(round(seconds), left)
-        while budget >= LEAST_S:
-            piece = _piece(draws, where, budget)
+        end = 0 if is_last else max(left - round(seconds), 0)
+        while left - end >= LEAST_S:
+            piece = _closing(draws, where, left) if is_last else None
             if piece is None:
-                where = {RURAL: SUBURB, SUBURB: CITY}.get(where, "") if is_last else ""
-                if not where:
+                piece = _piece(draws, where, left - end - STOP_S[0])
+            if piece is None:
+                if not is_last or where == CITY:
                     break
+                where = CITY if where == SUBURB else SUBURB
                 continue
-            used = add(piece[1:], where)
+            add(piece[1:], where)
             stop = round(draws.lognormal(STOP_MEDIAN_S[where], STOP_SPREAD))
-            stop = min(max(stop, STOP_S[0]), STOP_S[1], left - used)
-            used += add(np.zeros(stop), where)
-            budget, left = budget - used, left - used
+            stop = min(
+                max(stop, STOP_S[0]), STOP_S[1], round(STOP_SHARE_MAX * duration_s), left - LEAST_S
+            )
+            if left >= LEAST_S:  # else the trip is over
+                add(np.zeros(max(stop, 0)), where)
     add(np.zeros(left), where)
     return Wanted(np.concatenate(speed), np.concatenate(road))
 
 
-def _piece(draws: Draws, where: str, budget_s: int) -> Floats | None:
-    longest = budget_s - STOP_S[0]
+def _within(range_s: tuple[int, int], draws: Draws) -> int:
+    return range_s[0] + draws.integer(range_s[1] - range_s[0] + 1)
+
+
+def _closing(draws: Draws, where: str, left_s: int) -> Floats | None:
+    """Draw a last micro-trip, which ends some seconds before the trip does."""
+    if where == MOTORWAY or left_s > CLOSING_S:
+        return None
+    return draw_closing(draws, where, left_s - _within(STANDING_S, draws))
+
+
+def _piece(draws: Draws, where: str, longest_s: int) -> Floats | None:
     if where != MOTORWAY:
-        return draw_micro_trip(draws, where, longest)
-    seconds = min(longest, round(draws.uniform(*MOTORWAY_PART_S)))
+        return draw_micro_trip(draws, where, longest_s)
+    seconds = min(longest_s, round(draws.uniform(*MOTORWAY_PART_S)))
     return motorway(draws, seconds) if seconds >= SHORTEST_S else None
 
 

@@ -1,6 +1,7 @@
 """A driver who goes uphill as fast as a modest car can."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -32,7 +33,7 @@ def drive(wanted_mps: Floats, grade: Floats) -> Floats:
     last = len(slopes) - 1
     speed = [wanted[0]]
     way, v = 0.0, wanted[0]
-    for before, now in zip(wanted, wanted[1:], strict=False):
+    for before, now in pairwise(wanted):
         here = slopes[min(int(way / SPACING_M), last)]
         ahead = slopes[min(int((way + v) / SPACING_M) + 1, last)]
         pull = GRAVITY_MPS2 * max(here, ahead)

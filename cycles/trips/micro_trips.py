@@ -29,10 +29,12 @@ SPEED_SPREAD, TIME_SPREAD = 0.10, 0.08  # greatest change of speed and time, eit
 ACCEL_MAX_MPS2 = 2.6
 """The shipped cycles reach 2.7, between -2.6 and 2.7, and no stretch goes beyond."""
 
-NOISE_SHARE, NOISE_POLE = 0.03, 0.9
-"""Slow deviations from the stretched trace: sd 3 % of the speed, correlated over some 20 s."""
+NOISE_SHARE, NOISE_MOST, NOISE_POLE = 0.03, 2.5, 0.9
+"""Slow deviations from the stretched trace: sd 3 % of the speed, at most 2.5 sd, correlated over
+some 20 s."""
 
-CUT_FROM = 120  # points from which a micro-trip may lose a part of its middle
+CUT_FROM, CUT_SHARE = 120, 0.6  # points from which a micro-trip may lose a part, and how often
+CUT_ENDS, CUT_LEAST = 15, 20  # points that are kept at either end, and least that are left out
 CUT_MPS, CUT_MPS2 = 0.3, 0.25  # what speed and acceleration may differ by at the seam
 
 
@@ -60,19 +62,20 @@ def draw_micro_trip(draws: Draws, road: str, longest_s: int) -> Floats | None:
     -------
     speed at whole seconds, 0 at both ends; None if none is short enough
     """
-    pieces = micro_trips()[road]
-    fitting = [piece for piece in pieces if _shortest_s(piece) <= longest_s]
+    fitting = [piece for piece in micro_trips()[road] if _within_s(piece, longest_s)[0]]
     if not fitting:
         return None
     piece = draws.choice(fitting)
-    if len(piece) >= CUT_FROM and (draws.uniform() < 0.6 or len(piece) - 1 > longest_s):
+    if len(piece) >= CUT_FROM and (draws.uniform() < CUT_SHARE or len(piece) - 1 > longest_s):
         piece = _cut(draws, piece)
-    factor_v = 1.0 + draws.uniform(-SPEED_SPREAD, SPEED_SPREAD)
-    factor_t = 1.0 + draws.uniform(-TIME_SPREAD, TIME_SPREAD)
-    steps = round((len(piece) - 1) * factor_t)
-    if steps > longest_s:
-        steps = longest_s
-    return _noisy(draws, _stretched(piece, factor_v, steps))
+    stretch = 1.0 + draws.uniform(-TIME_SPREAD, TIME_SPREAD)
+    return _changed(draws, piece, min(round((len(piece) - 1) * stretch), longest_s))
+
+
+def draw_closing(draws: Draws, road: str, seconds: int) -> Floats | None:
+    """Draw a micro-trip of exactly this length; None if none can be stretched to it."""
+    fitting = [piece for piece in micro_trips()[road] if all(_within_s(piece, seconds))]
+    return _changed(draws, draws.choice(fitting), seconds) if fitting else None
 
 
 def slow_noise(draws: Draws, count: int, pole: float) -> Floats:
@@ -83,29 +86,27 @@ def slow_noise(draws: Draws, count: int, pole: float) -> Floats:
     return np.asarray(smooth / np.sqrt((1.0 + pole**2) / (1.0 - pole**2) ** 3))
 
 
-def _shortest_s(piece: Floats) -> float:
-    return (len(piece) - 1) * (1.0 - TIME_SPREAD)
+def _within_s(piece: Floats, seconds: int) -> tuple[bool, bool]:
+    """Whether a micro-trip can be squeezed into, and be stretched to, a number of seconds."""
+    steps = len(piece) - 1
+    return steps * (1.0 - TIME_SPREAD) <= seconds, steps * (1.0 + TIME_SPREAD) >= seconds
 
 
-def _stretched(piece: Floats, factor_v: float, steps: int) -> Floats:
-    """Another speed and another duration, slower where it would be too brisk."""
-    brisk = float(np.abs(np.diff(piece)).max()) * (len(piece) - 1) / steps
-    factor_v = min(factor_v, max(ACCEL_MAX_MPS2 / brisk, 0.0))
+def _changed(draws: Draws, piece: Floats, steps: int) -> Floats:
+    """Another duration, another speed, and other deviations from it; slower if too brisk."""
     at = np.linspace(0.0, len(piece) - 1.0, steps + 1)
-    return np.asarray(factor_v * np.interp(at, np.arange(float(len(piece))), piece))
-
-
-def _noisy(draws: Draws, speed: Floats) -> Floats:
-    factor = 1.0 + NOISE_SHARE * np.clip(slow_noise(draws, len(speed), NOISE_POLE), -2.5, 2.5)
-    noisy = speed * factor
-    return noisy if np.abs(np.diff(noisy)).max() <= ACCEL_MAX_MPS2 else speed
+    speed = np.interp(at, np.arange(float(len(piece))), piece)
+    speed *= 1.0 + draws.uniform(-SPEED_SPREAD, SPEED_SPREAD)
+    noise = np.clip(slow_noise(draws, len(speed), NOISE_POLE), -NOISE_MOST, NOISE_MOST)
+    speed *= 1.0 + NOISE_SHARE * noise
+    return np.asarray(speed * min(ACCEL_MAX_MPS2 / np.abs(np.diff(speed)).max(), 1.0))
 
 
 def _cut(draws: Draws, piece: Floats) -> Floats:
     """Leave out a part from the middle, between two points of equal speed and acceleration."""
     accel = np.gradient(piece)
-    first = 15 + draws.integer(len(piece) - 60)
-    later = np.arange(first + 20, len(piece) - 15)
+    first = CUT_ENDS + draws.integer(len(piece) - 2 * CUT_ENDS - CUT_LEAST)
+    later = np.arange(first + CUT_LEAST, len(piece) - CUT_ENDS)
     alike = later[
         (np.abs(piece[later] - piece[first]) < CUT_MPS)
         & (np.abs(accel[later] - accel[first]) < CUT_MPS2)

@@ -4,7 +4,7 @@ import numpy as np
 
 from qpmpc.cycles.cycle import Floats
 from qpmpc.cycles.trips.draws import Draws
-from qpmpc.cycles.trips.micro_trips import slow_noise
+from qpmpc.cycles.trips.micro_trips import NOISE_MOST, slow_noise
 
 SHORTEST_S = 180
 TARGET_MPS = (80.0 / 3.6, 130.0 / 3.6)
@@ -23,7 +23,8 @@ SMOOTHING_S = 7
 def motorway(draws: Draws, steps: int) -> Floats:
     """Draw a stretch of `steps` seconds, from rest to rest, speed at whole seconds in m/s."""
     target = _targets(draws, steps + 1)
-    fluctuation = draws.uniform(*FLUCTUATION_MPS) * slow_noise(draws, steps + 1, FLUCTUATION_POLE)
+    noise = np.clip(slow_noise(draws, steps + 1, FLUCTUATION_POLE), -NOISE_MOST, NOISE_MOST)
+    fluctuation = draws.uniform(*FLUCTUATION_MPS) * noise
     speed = [0.0]
     for wanted in target[1:].tolist():
         v = speed[-1]

@@ -15,6 +15,7 @@ from qpmpc.cli.cycles import cycles
 from qpmpc.cli.pil import pil
 from qpmpc.cli.reproduce import reproduce
 from qpmpc.cli.simulate import simulate
+from qpmpc.cli.trips import trips
 from qpmpc.cli.vehicles import vehicles
 from qpmpc.cli.verify import verify
 from qpmpc.errors import InputError, QpmpcError
@@ -40,6 +41,7 @@ app.command()(pil)
 app.command()(reproduce)
 app.command()(verify)
 app.command()(cycles)
+app.command()(trips)
 app.command()(vehicles)
 
 

@@ -9,8 +9,10 @@ from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle
 from qpmpc.errors import InputError
 from qpmpc.files import json_text, write_bytes, write_text
+from qpmpc.report.columns import Row
 from qpmpc.report.pwa_curves import PwaCurve
 from qpmpc.report.trajectory_csv import trajectory_csv
+from qpmpc.report.trip_set import cycle_csv
 from qpmpc.results import Run
 from qpmpc.vehicle.parameters import Vehicle
 
@@ -101,6 +103,29 @@ def write_cycle(cycle: Cycle, folder: Path) -> list[str]:
         return draw_cycle(cycle)
 
     file = folder / f"cycle_{cycle.name}.png"
+    return _write_picture(file, draw) or [f"{file} written"]
+
+
+def write_trips(trips: Sequence[Cycle], folder: Path) -> list[str]:
+    """Write trips as CSV, and a picture if it is a single one; returns remarks."""
+    for trip in trips:
+        write_text(folder / f"{trip.name}.csv", cycle_csv(trip))
+    if len(trips) > 1:
+        return [f"{folder}: {len(trips)} trips written, {trips[0].name}.csv and so on"]
+    return [f"{folder / trips[0].name}.csv written", *write_cycle(trips[0], folder)]
+
+
+def write_trip_set(
+    name: str, rows: Sequence[Row], shipped: Sequence[Row], folder: Path
+) -> list[str]:
+    """Draw the distributions of a set of trips; returns remarks."""
+
+    def draw() -> bytes:
+        from qpmpc.report.trip_set_picture import draw_trip_set
+
+        return draw_trip_set(name, rows, shipped)
+
+    file = folder / f"trips_{name}.png"
     return _write_picture(file, draw) or [f"{file} written"]
 
 
