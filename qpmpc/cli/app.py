@@ -15,6 +15,8 @@ from qpmpc.cli.cycles import cycles
 from qpmpc.cli.pil import pil
 from qpmpc.cli.reproduce import reproduce
 from qpmpc.cli.simulate import simulate
+from qpmpc.cli.studies import report, studies
+from qpmpc.cli.sweep import sweep
 from qpmpc.cli.trips import trips
 from qpmpc.cli.vehicles import vehicles
 from qpmpc.cli.verify import verify
@@ -40,6 +42,9 @@ app.command()(codegen)
 app.command()(pil)
 app.command()(reproduce)
 app.command()(verify)
+app.command()(sweep)
+app.command()(studies)
+app.command()(report)
 app.command()(cycles)
 app.command()(trips)
 app.command()(vehicles)

@@ -59,7 +59,7 @@ def sweep(
     """
     from qpmpc.cli.console import result_console, study_progress, write_json
     from qpmpc.cli.inputs import check_outputs
-    from qpmpc.study.report import print_summary, write_report
+    from qpmpc.report.study.table import print_study
     from qpmpc.study.sweep import sweep as run
 
     check_outputs(json_file, None)
@@ -70,6 +70,6 @@ def sweep(
     summary = results.summary()
     write_json(summary, json_file)
     console = result_console(json_file)
-    print_summary(console, summary)
-    for remark in write_report(results):
+    print_study(console, summary)
+    for remark in results.write_report():
         console.print(remark)

@@ -12,6 +12,7 @@ from rich.text import Text
 from qpmpc.report.columns import Column, Row, filled
 from qpmpc.shown import shown
 
+LONG = 40  # a cell of more characters is a sentence
 NAME_WIDTH = 20  # longer names of users' files are folded
 
 
@@ -51,6 +52,25 @@ def print_rows(
             part = list(names)
         part.append(column)
     console.print(_table(rows, part, section))
+
+
+def print_texts(
+    console: Console, header: Sequence[str], rows: Sequence[Sequence[str]], names: int = 1
+) -> None:
+    """Print a table of texts; its first `names` columns, and the last if it is long, are words.
+
+    Parameters
+    ----------
+    header, rows : the titles, and as many cells for each row
+    names : number of columns that are left-aligned
+    """
+    table = ShownTable(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
+    for i, title in enumerate(header):
+        words = i < names or any(len(row[i]) > LONG for row in rows)
+        table.add_column(title, justify="left" if words else "right", overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    console.print(table)
 
 
 def _width(console: Console, table: Table) -> int:

@@ -251,8 +251,7 @@ def load_study(name_or_path: str | os.PathLike[str]) -> Study:
     """
     name = os.fspath(name_or_path)
     if name in shipped_studies():
-        text = (_SHIPPED / f"{name}.toml").read_text("utf-8")
-        return as_study(load_toml(text, name), name)
+        return as_study(load_toml(shipped_text(name), name), name)
     path = Path(name)
     if path.suffix == "" and path.name == name and not os.path.exists(name):  # noqa: PTH110
         raise InputError(unknown("study", name, shipped_studies(), ", or a .toml file"))
@@ -263,6 +262,11 @@ def load_study(name_or_path: str | os.PathLike[str]) -> Study:
 def shipped_studies() -> tuple[str, ...]:
     """Return the names of the studies that come with the package."""
     return tuple(sorted(f.name.removesuffix(".toml") for f in _SHIPPED.iterdir()))
+
+
+def shipped_text(name: str) -> str:
+    """Return the file of a shipped study."""
+    return (_SHIPPED / f"{name}.toml").read_text("utf-8")
 
 
 def as_study(data: Mapping[str, Any], owner: str = "study", folder: Path | None = None) -> Study:

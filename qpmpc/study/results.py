@@ -2,6 +2,7 @@
 
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -9,15 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 from qpmpc.errors import InputError
 from qpmpc.report.provenance import provenance
-from qpmpc.results import OPTIMUM, REFERENCE
+from qpmpc.report.study.summary import study_summary
+from qpmpc.report.study.write import write_study
+from qpmpc.results import OPTIMUM, REFERENCE, Run
 from qpmpc.settings import validated
 from qpmpc.study.columns import SETTING, schema
 from qpmpc.study.definition import OF_RUN, Parameters, Study
+from qpmpc.study.inputs import Inputs, read_inputs
 from qpmpc.study.journal import rows_in
+from qpmpc.study.run import rerun
 from qpmpc.study.store import JOURNAL, SESSIONS, STUDY, part_files
 
 if TYPE_CHECKING:
-    from pandas import DataFrame, Series
+    from pandas import DataFrame
 
 
 @dataclass(frozen=True)
@@ -95,6 +100,33 @@ class StudyResults:
         except OSError:
             return ""
 
+    def rerun(self, row: Mapping[str, Any]) -> Run:
+        """Drive the run of a row again.
+
+        Raises
+        ------
+        Whatever makes the run impossible.
+        """
+        return rerun(parameters_of(row), self._inputs)
+
+    @cached_property
+    def _inputs(self) -> Inputs:
+        return read_inputs(self.study)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the figures of the study as plain data; see `study_summary`."""
+        return study_summary(self.frame(), self)
+
+    def write_report(self, folder: str | os.PathLike[str] | None = None) -> list[str]:
+        """Write report.html, pictures, summary.json and summary.md; returns remarks.
+
+        Parameters
+        ----------
+        folder : the study's own if None
+        """
+        into = self.folder if folder is None else Path(folder)
+        return write_study(self.frame(), self, into, self.rerun)
+
     def frame(self) -> "DataFrame":
         """Return all rows, sorted by `run`, with two columns more.
 
@@ -127,13 +159,13 @@ class StudyResults:
         return frame
 
 
-def parameters_of(row: "Series[Any]") -> Parameters:
-    """Return the parameters of a run from its row in a frame."""
+def parameters_of(row: Mapping[str, Any]) -> Parameters:
+    """Return the parameters of a run from its row."""
     import pandas as pd
 
     settings = {
         name.removeprefix(SETTING): value
-        for name, value in row.astype(object).to_dict().items()
+        for name, value in row.items()
         if name.startswith(SETTING) and not pd.isna(value)
     }
     return Parameters(
