@@ -3,7 +3,7 @@
 import ctypes
 import hashlib
 import platform
-from _ctypes import dlclose
+from _ctypes import dlclose, dlsym
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -44,6 +44,7 @@ _ABI_NAMES = (
     "offset of engine_on",
 )
 _STATE = 4
+_RETURNS_INT = ctypes.CFUNCTYPE(ctypes.c_int32)
 # Before mpc_step.c in a library whose solver fails where it is told to.
 MAY_FAIL = """#include <stdint.h>
 int32_t mpc_solver_may_succeed = 1;
@@ -91,8 +92,6 @@ def structures(precision: Precision, short: int, long: int) -> tuple[Any, Any]:
 def loaded(file: Path) -> ctypes.CDLL:
     """Load a library, to be closed when neither it nor any of its functions is in use.
 
-    The functions of a `CDLL` keep it; a variable in it (`in_dll`) does not.
-
     Raises
     ------
     OSError
@@ -102,6 +101,17 @@ def loaded(file: Path) -> ctypes.CDLL:
     closing = finalize(library, dlclose, library._handle)
     closing.atexit = False  # then the process ends, and what is left may still call into it
     return library
+
+
+def _function(library: ctypes.CDLL, name: str) -> Any:
+    """Return a function, which keeps its library from being closed.
+
+    Those that ctypes makes refer to themselves: they would go, and the library with them, only
+    when garbage is collected.
+    """
+    function = _RETURNS_INT(dlsym(library._handle, name))
+    function.library = library  # type: ignore[attr-defined]
+    return function
 
 
 class HostLibrary:
@@ -138,12 +148,11 @@ class HostLibrary:
         )
         try:
             self.functions = loaded(file)
-            # not as attributes, which the library would keep: a circle, and closed late
             abi, self.init, self.depart, self.step, self.plan = (
-                self.functions[f"{prefix}mpc_{name}"]
+                _function(self.functions, f"{prefix}mpc_{name}")
                 for name in ("abi", "init", "depart", "step", "plan")
             )
-        except (OSError, AttributeError) as error:
+        except OSError as error:
             raise CodegenError(f"{file} cannot be loaded: {error}") from error
         found = [abi(i) for i in range(len(_ABI_NAMES))]
         self.state_bytes = found[_STATE]
@@ -191,6 +200,7 @@ def build_host_library(
     kept = _kept(files)
     library = HostLibrary(kept.file, values, precision, remark=kept.remark)
     if may_fail:
+        # in the library's memory: good as long as that is loaded
         switch = ctypes.c_int32.in_dll(library.functions, "mpc_solver_may_succeed")
         library.solver_may_succeed = switch
     return library
@@ -241,8 +251,8 @@ def _built(files: Mapping[str, str], command: str, identity: str) -> bytes:
     try:
         common = kept_file(key, ".o", lambda: common_object(command, others))
         return library_of(command, files, common.file)
-    except CodegenError as error:
-        content = library_of(command, files)
+    except CodegenError:
+        content = library_of(command, files)  # fails as well if the fault is in the sources
         _WITHOUT_OBJECTS.add(identity)
-        say_once(f"every new vehicle takes a full compilation, about a second: {error}")
+        say_once(f"{command} cannot link an object: each new vehicle is compiled in full, 1 to 2 s")
         return content

@@ -97,3 +97,20 @@ def test_active_slope_is_the_derivative():
     inner = np.linspace(0.01, 2.99, 97)
     numeric = (fit(inner + 1e-7) - fit(inner - 1e-7)) / 2e-7
     np.testing.assert_allclose(fit.active_slope(inner), numeric, rtol=1e-6)
+
+
+def test_vehicles_in_other_weather_share_the_fits_and_nobody_can_change_them() -> None:
+    vehicle = load_vehicle()
+    ours = PwaModel.of(vehicle)
+    cold = PwaModel.of(vehicle.with_settings({"thermal.t_amb_degc": -12.5}))
+    assert cold.fuel is ours.fuel
+    assert cold.battery is ours.battery
+    assert cold.alpha is ours.alpha
+    arctic = PwaModel.of(vehicle.with_settings({"thermal.t_amb_degc": -35.0}))
+    assert arctic.alpha.breakpoints[0] == -35.0  # its range begins there
+    charged = PwaModel.of(vehicle.with_settings({"trip.soc_init": 0.7}))
+    assert charged.fuel is ours.fuel
+    assert not np.array_equal(charged.battery.slope, ours.battery.slope)
+    for array in (ours.fuel.slope, ours.alpha.breakpoints, ours.line.fuel_g_per_s):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0.0
