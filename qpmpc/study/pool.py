@@ -14,9 +14,13 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from multiprocessing.connection import wait as wait_for
+from time import perf_counter
 from typing import Any, Protocol, TypeVar
+
+from qpmpc.errors import QpmpcError
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -176,6 +180,48 @@ def completed(
                     deaths = 0
                     suspects.popleft()
                     yield batch[0], Lost(f"its process died, {DEATHS_MAX} times of {DEATHS_MAX}")
+
+
+def in_order(
+    function: Callable[[Job], Result],
+    jobs: Sequence[Job],
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Result]:
+    """Do jobs in processes of this machine and return their results in the order of the jobs.
+
+    Parameters
+    ----------
+    function : of one job; what it raises ends everything
+    progress : called as progress(done, in all)
+
+    Raises
+    ------
+    QpmpcError
+        If a job kills its process.
+    """
+    found: dict[int, Result] = {}
+    workers = LocalWorkers()
+    try:
+        for (number, _), result in completed(partial(_each, function), [*enumerate(jobs)], workers):
+            if isinstance(result, Lost):
+                raise QpmpcError(f"job {number}: {result.reason}")
+            found[number] = result
+            if progress is not None:
+                progress(len(found), len(jobs))
+    finally:
+        workers.close()
+    return [found[number] for number in range(len(jobs))]
+
+
+def _each(
+    function: Callable[[Job], Result], batch: Sequence[tuple[int, Job]]
+) -> list[tuple[Result, float]]:
+    done = []
+    for _, job in batch:
+        start = perf_counter()
+        result = function(job)
+        done.append((result, perf_counter() - start))
+    return done
 
 
 def _batch(jobs: Iterator[Job], job_s: float) -> list[Job]:

@@ -2,17 +2,18 @@
 
 import argparse
 import sys
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.progress import Progress
 
 from qpmpc.errors import InputError
 from qpmpc.files import write_text
+from qpmpc.study.pool import in_order
 from qpmpc.vehicle import vehicle_names
 from qpmpc.verification.faults.standard import standard_faults
-from qpmpc.verification.faults.table import measured, summary, table
+from qpmpc.verification.faults.table import Row, measured, summary, table
 
 BEGIN, END = "<!-- faults: written by python -m qpmpc.verification.faults -->", "<!-- end -->"
 
@@ -26,13 +27,10 @@ def main(arguments: list[str] | None = None) -> int:
     if not 0 <= text.find(BEGIN) < text.find(END):
         raise InputError(f"{page}: no marks {BEGIN} and {END}")
     faults, cars = standard_faults(), vehicle_names()
-    with (
-        ProcessPoolExecutor() as pool,
-        Progress(console=Console(stderr=True), transient=True) as bar,
-    ):
-        each = [(fault, car) for car in cars for fault in faults]
-        found = pool.map(measured, *zip(*each, strict=True))
-        rows = list(bar.track(found, total=len(each), description="faults"))
+    each = [(fault, car) for car in cars for fault in faults]
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("faults", total=len(each))
+        rows = in_order(_measured, each, lambda done, _: bar.update(task, completed=done))
     parts = []
     for car in cars:
         of_car, rows = rows[: len(faults)], rows[len(faults) :]
@@ -40,6 +38,10 @@ def main(arguments: list[str] | None = None) -> int:
     before, after = text.partition(BEGIN)[0], text.partition(END)[2]
     write_text(page, before + BEGIN + "\n\n" + "\n".join(parts) + "\n" + END + after)
     return 0
+
+
+def _measured(job: tuple[dict[str, Any], str]) -> Row:
+    return measured(*job)
 
 
 if __name__ == "__main__":

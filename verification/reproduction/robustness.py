@@ -1,10 +1,8 @@
-"""Closed loop under wrong forecasts: many seeded trips, two processes."""
+"""Closed loop under wrong forecasts: many seeded trips, in processes."""
 
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
-from multiprocessing import get_context
 
 import numpy as np
 
@@ -13,10 +11,10 @@ from qpmpc.cycles import Cycle
 from qpmpc.preview.forecast_errors import MODELS, forecast
 from qpmpc.results import Run
 from qpmpc.simulation import simulate
+from qpmpc.study.pool import in_order
 from qpmpc.vehicle.parameters import Vehicle
 
 CONTROLLER = "mh-qp"
-PROCESSES = 2
 
 Progress = Callable[[int, int], None]
 
@@ -72,17 +70,7 @@ def run_forecasts(
     """
     fuel_g = perfect.fuel_soc_balanced_g
     jobs = [(cycle, vehicle, settings, *key, fuel_g) for key in product(MODELS, range(seeds))]
-    finished = []
-    for i, run in enumerate(_mapped(jobs)):
-        finished.append(run)
-        progress(i + 1, len(jobs))
-    return finished
-
-
-def _mapped(jobs: list[Job]) -> Iterator[ForecastRun]:
-    # spawned, not forked: the compiled code of dynamic programming has threads by now
-    with ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
-        yield from pool.map(_one, jobs, chunksize=2)
+    return in_order(_one, jobs, progress)
 
 
 def _one(job: Job) -> ForecastRun:
