@@ -9,8 +9,8 @@ CycleArgument = Annotated[
     str,
     typer.Argument(
         metavar="CYCLE",
-        help="A shipped cycle (see [b]qpmpc cycles[/b]) or a CSV file "
-        "with time_s,speed_mps[dim],grade[/dim].",
+        help="A shipped cycle (see [b]qpmpc cycles[/b]), a trip (see [b]qpmpc trips[/b]) or a CSV "
+        "file with time_s,speed_mps[dim],grade[/dim].",
         show_default=False,
     ),
 ]

@@ -1,6 +1,7 @@
 """``qpmpc trips``."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 
@@ -13,6 +14,8 @@ def test_table_of_both_sets_beside_the_cycles(cli, tmp_path):
     assert done.code == 0
     firsts = [line.split()[0] for line in done.out.splitlines() if line.strip()]
     assert firsts[2:] == [*cycle_names(), *["train"] * 3, *["judge"] * 3]
+    table = "\n".join(line.rstrip() for line in done.out.splitlines())
+    assert table in (Path(__file__).parents[2] / "docs" / "trips.md").read_text("utf-8")
     data = json.loads((tmp_path / "trips.json").read_text())
     assert len(data["trips"]) == 400
     median = next(r for r in data["sets"] if r["name"] == "judge" and r["quantile"] == "median")
