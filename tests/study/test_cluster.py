@@ -26,15 +26,15 @@ class Cluster:
     def __init__(self, folder: Path) -> None:
         self.file = folder / "scheduler.json"
         self.processes: list[subprocess.Popen[bytes]] = []
-        self._start("scheduler", "--port", "0", "--host", "127.0.0.1", "--scheduler-file", self.file)
+        self._start(
+            "scheduler", "--port", "0", "--host", "127.0.0.1", "--scheduler-file", self.file
+        )
         until = time.monotonic() + START_S
         while not self.file.exists() and time.monotonic() < until:
             time.sleep(0.05)
 
     def worker(self) -> "subprocess.Popen[bytes]":
-        return self._start(
-            "worker", "--scheduler-file", self.file, "--nthreads", "1", "--no-nanny"
-        )
+        return self._start("worker", "--scheduler-file", self.file, "--nthreads", "1", "--no-nanny")
 
     def _start(self, kind: str, *options: object) -> "subprocess.Popen[bytes]":
         command = [sys.executable, "-m", "distributed.cli.dask_" + kind, "--no-dashboard"]

@@ -24,6 +24,6 @@ def print_study(console: Console, summary: Mapping[str, Any]) -> None:
 
 def print_comparison(console: Console, comparison: Mapping[str, Any]) -> None:
     """Print what `compare_studies` found: one row per vehicle and controller, then its remarks."""
-    print_texts(console, *comparison_table(comparison))
+    print_texts(console, *comparison_table(comparison, "fuel_soc_balanced_percent"))
     for remark in comparison["remarks"]:
         console.print(remark)
