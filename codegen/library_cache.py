@@ -204,11 +204,12 @@ def _bound(folder: Path, newest: Path) -> None:
 
 def _files(folder: Path) -> Iterator[tuple[float, int, Path]]:
     """Time of the last use, size and name."""
-    for pattern in ("*.so", "*.o", ".*.tmp", ".*.lock"):
-        for file in folder.glob(pattern):
-            with suppress(FileNotFoundError):  # a temporary one, renamed meanwhile
-                found = file.lstat()
-                yield found.st_mtime, found.st_size, file
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.endswith((".so", ".o", ".tmp", ".lock")):
+                with suppress(FileNotFoundError):  # a temporary one, renamed meanwhile
+                    found = entry.stat(follow_symlinks=False)
+                    yield found.st_mtime, found.st_size, Path(entry.path)
 
 
 @contextmanager
