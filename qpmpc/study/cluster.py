@@ -1,10 +1,12 @@
 """The processes of an existing Dask cluster."""
 
-from collections.abc import Callable
-from concurrent.futures import Future
-from contextlib import suppress
+import logging
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError, Future
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from importlib.util import find_spec
+from time import monotonic
 from typing import Any, TypeVar
 
 from qpmpc.errors import InputError, QpmpcError
@@ -12,6 +14,7 @@ from qpmpc.errors import InputError, QpmpcError
 Result = TypeVar("Result")
 
 REACH_S = 10.0  # in which a scheduler answers
+COUNT_S = 2.0  # between two counts of the workers
 WORKERS_S = 30.0  # in which its first worker is there
 
 
@@ -32,7 +35,7 @@ class ClusterWorkers:
         if find_spec("distributed") is None:
             raise InputError("a scheduler needs dask: pip install 'qpmpc-iptm[sweep]'")
         distributed: Any = import_module("distributed")
-        self._address, self._distributed = address, distributed
+        self._address = address
         _quiet()
         try:
             self._client = distributed.Client(address, timeout=REACH_S, set_as_default=False)
@@ -48,15 +51,23 @@ class ClusterWorkers:
                 f"dask worker {address}"
             ) from None
         self._executor = self._client.get_executor(pure=False)
+        self._killed = distributed.scheduler.KilledWorker
+        self._closed = distributed.comm.core.CommClosedError
+        self._slots, self._counted_until = 1, 0.0
 
     @property
     def slots(self) -> int:
         """See `Workers`."""
-        return max(1, sum(self._client.nthreads().values()))
+        if monotonic() > self._counted_until:
+            with self._connected():
+                self._slots = max(1, sum(self._client.nthreads().values()))
+            self._counted_until = monotonic() + COUNT_S
+        return self._slots
 
     def submit(self, function: Callable[[Any], Result], batch: Any) -> Future[Result]:
         """See `Workers`."""
-        future: Future[Result] = self._executor.submit(function, batch)
+        with self._connected():
+            future: Future[Result] = self._executor.submit(function, batch)
         return future
 
     def died(self, error: BaseException) -> bool:
@@ -67,9 +78,19 @@ class ClusterWorkers:
         QpmpcError
             If the scheduler is gone.
         """
-        if self._client.status != "running":
-            raise QpmpcError(f"scheduler {self._address} is gone; --resume goes on later") from None
-        return isinstance(error, self._distributed.scheduler.KilledWorker)
+        if isinstance(error, CancelledError | self._closed):
+            raise self._gone() from None
+        return isinstance(error, self._killed)
+
+    @contextmanager
+    def _connected(self) -> Iterator[None]:
+        try:
+            yield
+        except (CancelledError, OSError, TimeoutError, RuntimeError):
+            raise self._gone() from None
+
+    def _gone(self) -> QpmpcError:
+        return QpmpcError(f"scheduler {self._address} is gone; --resume goes on later")
 
     def close(self) -> None:
         """See `Workers`."""
@@ -80,6 +101,4 @@ class ClusterWorkers:
 
 def _quiet() -> None:
     """Keep the client's log off the terminal: what matters is raised."""
-    import logging
-
     logging.getLogger("distributed").setLevel(logging.CRITICAL)

@@ -291,8 +291,8 @@ def _located(value: Any, folder: Path, key: str = "") -> Any:
         names = {k: key if k in KINDS else str(k) for k in value}
         return {k: _located(inner, folder, names[k]) for k, inner in value.items()}
     if isinstance(value, list):
-        names = _expanded(value) if key == "cycle" else value
-        return [_located(inner, folder, key) for inner in names]
+        each = _expanded(value) if key == "cycle" else value
+        return [_located(inner, folder, key) for inner in each]
     is_file = key in FILES and isinstance(value, str) and (Path(value).suffix or "/" in value)
     return str(folder / value) if is_file else value
 

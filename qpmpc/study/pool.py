@@ -11,7 +11,7 @@ import signal
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
@@ -162,7 +162,7 @@ def completed(
         alone = bool(suspects) and len(pending) == 1 and [suspects[0]] in pending.values()
         for future in wait(pending, return_when=FIRST_COMPLETED).done:
             batch = pending.pop(future)
-            error = future.exception()
+            error = CancelledError() if future.cancelled() else future.exception()
             if error is None:
                 if alone:
                     suspects.popleft()

@@ -150,5 +150,7 @@ def test_a_full_disk_is_one_line(tmp_path: Path) -> None:
     assert JOURNAL in said
     there = finished(folder)
     assert there > 0
-    assert started(file, folder).wait(60) == 0
+    again = started(file, folder)
+    again.communicate(timeout=60)
+    assert again.returncode == 0
     assert finished(folder) == 60
