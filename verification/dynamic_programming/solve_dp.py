@@ -26,7 +26,8 @@ def solve_dp(
     vehicle : the plant; `trip` gives the start, and the final SOC must not be below the first
     settings : grids, `DpSettings()` if None
     progress : called with the finished fraction, 0 to 1
-    use_cache : whether to take the result from disk if it is there, and to keep it there
+    use_cache : whether to take the result from disk if it is there, and to keep it there; if
+        another process is about to store it, that is waited for
 
     Raises
     ------
@@ -37,18 +38,26 @@ def solve_dp(
     """
     settings = settings or DpSettings()
     report = progress or _ignore
+    if not use_cache:
+        return _solve(cycle, vehicle, settings, report)
     key = cache.key(cycle, vehicle, settings)
-    known = cache.load(key) if use_cache else None
-    if known is not None:
-        report(1.0)
-        return known
+    known = cache.load(key)
+    if known is None:
+        with cache.alone(key):
+            known = cache.load(key)  # another process may have stored it meanwhile
+            if known is None:
+                solution = _solve(cycle, vehicle, settings, report)
+                cache.store(key, solution)
+                return solution
+    report(1.0)
+    return known
+
+
+def _solve(cycle: Cycle, vehicle: Vehicle, settings: DpSettings, report: Progress) -> DpSolution:
     # here, so that only solving needs numba
     from qpmpc.verification.dynamic_programming.levels import solve
 
-    solution = solve(cycle, vehicle, settings, report)
-    if use_cache:
-        cache.store(key, solution)
-    return solution
+    return solve(cycle, vehicle, settings, report)
 
 
 def convergence_study(
