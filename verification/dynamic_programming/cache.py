@@ -43,7 +43,8 @@ def key(cycle: Cycle, vehicle: Vehicle, settings: DpSettings) -> str:
     for array in (cycle.speed_mps, cycle.grade):
         digest.update(str(len(array)).encode() + array.tobytes())
     digest.update(vehicle.model_dump_json().encode())
-    digest.update(settings.model_dump_json(exclude={"threads"}).encode())
+    tube = (settings.tube_soc, settings.tube_t_cl_k)
+    digest.update(json.dumps([settings.cells, tube]).encode())
     return digest.hexdigest()
 
 

@@ -7,6 +7,7 @@ from qpmpc.vehicle import Vehicle
 from qpmpc.verification.dynamic_programming import cache
 from qpmpc.verification.dynamic_programming.settings import DpSettings
 from qpmpc.verification.dynamic_programming.solution import DpSolution
+from qpmpc.verification.dynamic_programming.threads import default_threads
 
 Progress = Callable[[float], None]
 
@@ -32,32 +33,35 @@ def solve_dp(
     Raises
     ------
     InputError
-        If the trip starts outside the coolant limits.
+        If the trip starts outside the coolant limits, or QPMPC_THREADS is no number of threads.
     QpmpcError
         If numba is not installed.
     """
     settings = settings or DpSettings()
     report = progress or _ignore
+    threads = settings.threads or default_threads()
     if not use_cache:
-        return _solve(cycle, vehicle, settings, report)
+        return _solve(cycle, vehicle, settings, threads, report)
     key = cache.key(cycle, vehicle, settings)
     known = cache.load(key)
     if known is None:
         with cache.alone(key):
             known = cache.load(key)  # another process may have stored it meanwhile
             if known is None:
-                solution = _solve(cycle, vehicle, settings, report)
+                solution = _solve(cycle, vehicle, settings, threads, report)
                 cache.store(key, solution)
                 return solution
     report(1.0)
     return known
 
 
-def _solve(cycle: Cycle, vehicle: Vehicle, settings: DpSettings, report: Progress) -> DpSolution:
+def _solve(
+    cycle: Cycle, vehicle: Vehicle, settings: DpSettings, threads: int, report: Progress
+) -> DpSolution:
     # here, so that only solving needs numba
     from qpmpc.verification.dynamic_programming.levels import solve
 
-    return solve(cycle, vehicle, settings, report)
+    return solve(cycle, vehicle, settings, threads, report)
 
 
 def convergence_study(
