@@ -90,6 +90,7 @@ def _drive(
             *controller.remarks,
             *_fallbacks(controller.name, record.fallback),
         ),
+        reservations=tuple(controller.reservations),
         vehicle=trip.vehicle,
         distance_km=trip.cycle.distance_m / 1e3,
         trajectory=record,

@@ -88,6 +88,7 @@ class Run:
     vehicle : parameters, overrides included
     trajectory : second by second
     faults : what injected faults did, as plain data; see `qpmpc.faults.effects`
+    reservations : why its controller says that its fuel cannot be compared
     """
 
     cycle: str
@@ -99,6 +100,7 @@ class Run:
     distance_km: float
     trajectory: Trajectory
     faults: dict[str, Any] | None = None
+    reservations: tuple[str, ...] = ()
 
     @property
     def fuel_g(self) -> float:
@@ -126,7 +128,7 @@ class Run:
     @cached_property
     def not_comparable(self) -> list[str]:
         """Why the run's fuel cannot be compared with that of others; empty if it can."""
-        found = []
+        found = list(self.reservations)
         share = abs(self.soc_correction_g) / self.fuel_g if self.fuel_g else np.inf
         if self.soc_correction_g and share > COMPARABLE_SHARE:
             found.append(

@@ -40,10 +40,14 @@ def numbers(model: type[BaseModel], prefix: str = "") -> Iterator[Number]:
             yield from numbers(field.annotation, f"{prefix}{name}.")
         elif field.annotation in (int, float):
             yield bounded(prefix + name, field.annotation, field.metadata)
-        elif get_origin(field.annotation) is tuple:
-            entry, *metadata = get_args(get_args(field.annotation)[0])
+        elif args := get_args(
+            get_args(field.annotation)[0] if get_args(field.annotation) else None
+        ):
+            # of each entry of an array, or of a number that need not be given
+            kind, *metadata = args
             metadata = [part for each in metadata for part in getattr(each, "metadata", [each])]
-            yield bounded(f"{prefix}{name}[]", entry, metadata)
+            entries = "[]" if get_origin(field.annotation) is tuple else ""
+            yield bounded(f"{prefix}{name}{entries}", kind, metadata)
 
 
 def bounded(name: str, kind: type, metadata: list[Any]) -> Number:

@@ -120,6 +120,7 @@ class Controller(Driver, ABC):
     ----------
     implementation : language that the decisions are computed in
     remarks : what a user should know about the choices made for this run, one line each
+    reservations : why the fuel of this run cannot be compared, one line each
     """
 
     implementation: str = "python"
@@ -134,6 +135,7 @@ class Controller(Driver, ABC):
     def __init__(self, trip: Trip, settings: SettingsLike | None = None) -> None:
         super().__init__(trip, settings)
         self.remarks: list[str] = []
+        self.reservations: list[str] = []
         self._lasting_remarks: list[str] = []
         self.safety = SafetyLayer(trip.plant)
         self.monitor = InputMonitor(trip.plant)
@@ -227,6 +229,7 @@ class Controller(Driver, ABC):
         """Make ready for another run of the same trip, which begins with `depart`."""
         if self._under_way:
             self.remarks = list(self._lasting_remarks)  # those of the run are said
+            self.reservations = []
         self._under_way = False
 
 

@@ -16,21 +16,18 @@ Function = TypeVar("Function", bound=Callable[..., object])
 
 
 def compiled(function: Function) -> Function:
-    """Compile without the GIL, and keep the machine code on disk where there is a place for it."""
-    return _compiled(function, inline=False)
+    """Compile without the GIL, and keep the machine code on disk where there is a place for it.
+
+    For functions of one signature only: numba numbers those of a function in the order in which
+    they come, and processes that start together could take one for another.
+    """
+    try:
+        result = numba.njit(nogil=True, error_model="numpy", cache=True)(function)
+    except RuntimeError:  # neither the package's folder nor the user's cache can be written
+        result = numba.njit(nogil=True, error_model="numpy")(function)
+    return cast(Function, result)
 
 
 def inlined(function: Function) -> Function:
-    """Compile a small function into its callers, where its arguments need not be passed on."""
-    return _compiled(function, inline=True)
-
-
-def _compiled(function: Function, inline: bool) -> Function:
-    def kept(on_disk: bool) -> object:
-        make = numba.njit(nogil=True, error_model="numpy", forceinline=inline, cache=on_disk)
-        return make(function)
-
-    try:
-        return cast(Function, kept(on_disk=True))
-    except RuntimeError:  # neither the package's folder nor the user's cache can be written
-        return cast(Function, kept(on_disk=False))
+    """Compile a small function into its callers, whose machine code is kept."""
+    return cast(Function, numba.njit(nogil=True, error_model="numpy", forceinline=True)(function))

@@ -22,6 +22,15 @@ class Dp(Replay):
         grid = self.settings.of("dp", DpSettings())
         report = None if progress is None else as_fraction(progress)
         plan = solve_dp(self.trip.cycle, self.trip.vehicle, grid, report)
+        if not plan.admissible:
+            self.reservations.append(
+                "dynamic programming found nothing that keeps all limits and the final SOC"
+            )
+        elif not plan.converged:
+            self.remarks.append(
+                f"dp: on {plan.cycle} the optimum still touches the edge of its tube after "
+                f"{len(plan.levels) - 1} tubes: its fuel may be too high"
+            )
         pairs = zip(plan.engine_on.tolist(), plan.p_eng_w.tolist(), strict=True)
         return [Command(on, p_eng_w) for on, p_eng_w in pairs]
 

@@ -240,7 +240,7 @@ def off_step(
     return next_soc(maps, constants, x, demand_w, 0.0)
 
 
-@compiled
+@inlined
 def off_step_inverse(
     maps: Maps,
     constants: Constants,

@@ -1,7 +1,6 @@
 """Coarse grid, then a tube around its trajectory."""
 
 from collections.abc import Callable
-from os import cpu_count
 
 import numpy as np
 
@@ -20,16 +19,19 @@ WIDENING = 1.5
 
 
 def solve(
-    cycle: Cycle, vehicle: Vehicle, settings: DpSettings, progress: Callable[[float], None]
+    cycle: Cycle,
+    vehicle: Vehicle,
+    settings: DpSettings,
+    threads: int,
+    progress: Callable[[float], None],
 ) -> DpSolution:
     """Solve all levels; see `solve_dp` of this package."""
     problem = build_problem(cycle, vehicle)
-    threads = settings.threads or _cores()
-    power = settings.power_step_w
-    step = (settings.soc_step, settings.t_cl_step_k)
+    soc_step, t_cl_step_k, power, refinement = settings.cells
+    step = (soc_step, t_cl_step_k)
     coarse = Grid.full(problem, *step, power)
     width = (settings.tube_soc, settings.tube_t_cl_k)
-    fine = (step[0] / settings.refinement, step[1] / settings.refinement)
+    fine = (step[0] / refinement, step[1] / refinement)
     levels = []
 
     def run(grid: Grid, begin: float, end: float) -> Trajectory:
@@ -45,7 +47,7 @@ def solve(
         levels.append(_level(grid, path))
         return path
 
-    if settings.refinement == 1:
+    if refinement == 1:
         return _solution(cycle, problem, run(coarse, 0.0, 1.0), levels)
     # the tube has at first about this many nodes, and work is in proportion
     tube_nodes = 4.0 * width[0] * width[1] / (fine[0] * fine[1])
@@ -101,12 +103,3 @@ def _solution(
         levels=tuple(levels),
         admissible=path.admissible,
     )
-
-
-def _cores() -> int:
-    try:
-        from os import sched_getaffinity
-
-        return len(sched_getaffinity(0))
-    except ImportError:
-        return cpu_count() or 1

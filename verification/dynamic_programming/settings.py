@@ -1,8 +1,10 @@
 """How finely dynamic programming resolves state and input."""
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from qpmpc.verification.dynamic_programming.threads import THREADS_MAX
 
 CELLS_MAX = 4e6
 """Of one grid: some gigabytes, as its values at some tens of seconds are kept."""
@@ -10,8 +12,20 @@ CELLS_MAX = 4e6
 T_CL_RANGE_K = 100.0
 
 
+class Cells(NamedTuple):
+    """Coarse cells in SOC and T, spacing of the engine power, fine cells in one coarse."""
+
+    soc_step: float
+    t_cl_step_k: float
+    power_step_w: float
+    refinement: int
+
+
+GRIDS = {"reference": Cells(0.002, 0.5, 500.0, 8), "quick": Cells(0.004, 1.0, 1000.0, 4)}
+
+
 class DpSettings(BaseModel):
-    """Grid of the state and the input; the defaults are the reference, `quick` takes seconds.
+    """Grid of the state and the input; `cells` are those that it comes to.
 
     Two levels are solved: the whole box of limits on a coarse grid, then a tube around the
     coarse trajectory whose cells are `refinement` times smaller in SOC and in T. The tube moves
@@ -19,40 +33,58 @@ class DpSettings(BaseModel):
 
     Attributes
     ----------
+    grid : `reference`, or `quick`, eight times as fast; see docs/dynamic_programming.md for errors
     soc_step, t_cl_step_k : cells of the coarse grid, 1 and K
     power_step_w : spacing of the engine power in the backward pass; the forward pass refines it
-    refinement : cells of the tube in one coarse cell, along each axis
+    refinement : cells of the tube in one coarse cell, along each axis. Each of these four, if
+        given, takes the place of the reference's; `quick` comes with its own and allows none
     tube_soc, tube_t_cl_k : half widths of the tube at first, 1 and K
-    threads : processor cores to use, all that are allowed if None; does not change the result
+    threads : processor cores to use; if None those of `threads.default_threads`; does not change
+        the result
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    soc_step: Annotated[float, Field(ge=1e-4, le=0.1)] = 0.002
-    t_cl_step_k: Annotated[float, Field(ge=0.01, le=10.0)] = 0.5
-    power_step_w: Annotated[float, Field(ge=10.0, le=10e3)] = 500.0
-    refinement: Annotated[int, Field(ge=1, le=256)] = 8
+    grid: Literal["reference", "quick"] = "reference"
+    soc_step: Annotated[float, Field(ge=1e-4, le=0.1)] | None = None
+    t_cl_step_k: Annotated[float, Field(ge=0.01, le=10.0)] | None = None
+    power_step_w: Annotated[float, Field(ge=10.0, le=10e3)] | None = None
+    refinement: Annotated[int, Field(ge=1, le=256)] | None = None
     tube_soc: Annotated[float, Field(ge=1e-3, le=1.0)] = 0.04
     tube_t_cl_k: Annotated[float, Field(ge=0.1, le=100.0)] = 5.0
-    threads: Annotated[int, Field(ge=1, le=1024)] | None = None
+    threads: Annotated[int, Field(ge=1, le=THREADS_MAX)] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        box = T_CL_RANGE_K / (self.soc_step * self.t_cl_step_k)
-        cell = self.soc_step * self.t_cl_step_k / self.refinement**2
+        if self.grid != "reference" and self._given():
+            raise ValueError(
+                f"grid {self.grid!r} has its own {', '.join(self._given())}: give one or the other"
+            )
+        soc_step, t_cl_step_k, _, refinement = self.cells
+        box = T_CL_RANGE_K / (soc_step * t_cl_step_k)
+        cell = soc_step * t_cl_step_k / refinement**2
         tube = 4.0 * self.tube_soc * self.tube_t_cl_k / cell
         for cells, keys in ((box, "soc_step, t_cl_step_k"), (tube, "tube_soc, tube_t_cl_k")):
             if cells > CELLS_MAX:
                 raise ValueError(f"{keys} make {cells:.2g} cells, at most {CELLS_MAX:.2g}")
         return self
 
+    def _given(self) -> dict[str, float]:
+        values = ((name, getattr(self, name)) for name in Cells._fields)
+        return {name: value for name, value in values if value is not None}
+
+    @property
+    def cells(self) -> Cells:
+        """Spacings of the named grid, each replaced by the one that is given."""
+        return Cells(**(GRIDS[self.grid]._asdict() | self._given()))
+
     @classmethod
     def quick(cls) -> "DpSettings":
         """Coarser grids for quick use; see docs/dynamic_programming.md for their error."""
-        return cls(soc_step=0.004, t_cl_step_k=1.0, power_step_w=1000.0, refinement=4)
+        return cls(grid="quick")
 
     def doubled(self) -> "DpSettings":
         """Halve every spacing of the tube: cells in SOC and T, and the engine power."""
-        return self.model_copy(
-            update={"refinement": 2 * self.refinement, "power_step_w": 0.5 * self.power_step_w}
-        )
+        soc_step, t_cl_step_k, power_step_w, refinement = self.cells
+        finer = Cells(soc_step, t_cl_step_k, 0.5 * power_step_w, 2 * refinement)
+        return self.model_copy(update={"grid": "reference", **finer._asdict()})

@@ -7,6 +7,7 @@ from qpmpc.vehicle import Vehicle
 from qpmpc.verification.dynamic_programming import cache
 from qpmpc.verification.dynamic_programming.settings import DpSettings
 from qpmpc.verification.dynamic_programming.solution import DpSolution
+from qpmpc.verification.dynamic_programming.threads import default_threads
 
 Progress = Callable[[float], None]
 
@@ -26,29 +27,41 @@ def solve_dp(
     vehicle : the plant; `trip` gives the start, and the final SOC must not be below the first
     settings : grids, `DpSettings()` if None
     progress : called with the finished fraction, 0 to 1
-    use_cache : whether to take the result from disk if it is there, and to keep it there
+    use_cache : whether to take the result from disk if it is there, and to keep it there; if
+        another process is about to store it, that is waited for
 
     Raises
     ------
     InputError
-        If the trip starts outside the coolant limits.
+        If the trip starts outside the coolant limits, or QPMPC_THREADS is no number of threads.
     QpmpcError
         If numba is not installed.
     """
     settings = settings or DpSettings()
     report = progress or _ignore
+    threads = settings.threads or default_threads()
+    if not use_cache:
+        return _solve(cycle, vehicle, settings, threads, report)
     key = cache.key(cycle, vehicle, settings)
-    known = cache.load(key) if use_cache else None
-    if known is not None:
-        report(1.0)
-        return known
+    known = cache.load(key)
+    if known is None:
+        with cache.alone(key):
+            known = cache.load(key)  # another process may have stored it meanwhile
+            if known is None:
+                solution = _solve(cycle, vehicle, settings, threads, report)
+                cache.store(key, solution)
+                return solution
+    report(1.0)
+    return known
+
+
+def _solve(
+    cycle: Cycle, vehicle: Vehicle, settings: DpSettings, threads: int, report: Progress
+) -> DpSolution:
     # here, so that only solving needs numba
     from qpmpc.verification.dynamic_programming.levels import solve
 
-    solution = solve(cycle, vehicle, settings, report)
-    if use_cache:
-        cache.store(key, solution)
-    return solution
+    return solve(cycle, vehicle, settings, threads, report)
 
 
 def convergence_study(
