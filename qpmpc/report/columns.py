@@ -19,7 +19,8 @@ class Column:
     is_name: bool = False
 
 
-def _number(value: float | None, digits: int) -> str:
+def number(value: float | None, digits: int) -> str:
+    """Return a number with fixed digits, never "-0"; `NONE` if there is none."""
     if value is None:
         return NONE
     text = f"{value:.{digits}f}"
@@ -28,7 +29,7 @@ def _number(value: float | None, digits: int) -> str:
 
 def _marked(row: Row, key: str, digits: int) -> str:
     """Number, if there is one, with the mark of runs that are not comparable."""
-    text = _number(row[key], digits)
+    text = number(row[key], digits)
     return text if row["comparable"] or row[key] is None else text + NOT_COMPARABLE
 
 
@@ -64,7 +65,7 @@ NAMES = (
     Column("controller", lambda row: row["controller"], is_name=True),
 )
 FUEL = (
-    Column("fuel g", lambda row: _number(row["fuel_g"], 1)),
+    Column("fuel g", lambda row: number(row["fuel_g"], 1)),
     Column("balanced g", lambda row: _marked(row, "fuel_soc_balanced_g", 1)),
 )
 AGAINST = (

@@ -1,5 +1,6 @@
 """Style of all pictures: colours that colour-blind readers can tell apart."""
 
+import warnings
 from io import BytesIO
 from typing import Any
 
@@ -61,5 +62,8 @@ def png(figure: Figure) -> bytes:
     """Render as PNG, without the date, so that equal results make equal files."""
     as_plain_text(figure)
     buffer = BytesIO()
-    figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
+    with warnings.catch_warnings():
+        # names in a script that the font lacks are drawn as boxes
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
     return buffer.getvalue()

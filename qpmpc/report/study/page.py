@@ -1,0 +1,63 @@
+"""The page of a report: sections of text, tables and pictures; one self-contained file."""
+
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from qpmpc.report.html import html_page
+
+
+@dataclass(frozen=True)
+class Table:
+    """Headings and cells; the first `names` columns are left-aligned."""
+
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    names: int = 1
+    title: str = ""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a page, its contents in the order in which they are shown.
+
+    Attributes
+    ----------
+    pictures : name and PNG, in base64
+    texts : heading and text in a fixed-width font
+    folded : label and tables that a click opens
+    """
+
+    title: str = ""
+    paragraphs: Sequence[str] = ()
+    tables: Sequence[Table] = ()
+    remarks: Sequence[str] = ()
+    pictures: Sequence[tuple[str, str]] = ()
+    texts: Sequence[tuple[str, str]] = ()
+    folded: Sequence[tuple[str, Sequence[Table]]] = field(default=())
+
+
+def page(title: str, quiet: str, sections: Sequence[Section]) -> str:
+    """Return the page; all text is escaped.
+
+    Parameters
+    ----------
+    quiet : the line below the title
+    """
+    return html_page(
+        "qpmpc.report.study", "page.html.j2", title=title, quiet=quiet, sections=sections
+    )
+
+
+def chosen(pictures: Mapping[str, bytes], start: str) -> list[tuple[str, str]]:
+    """Return the pictures whose names begin like this, for a `Section`."""
+    return [
+        (name.replace("_", " "), b64encode(data).decode())
+        for name, data in pictures.items()
+        if name.startswith(start)
+    ]
+
+
+def table_of(data: Mapping[str, str]) -> Table:
+    """Return names and values as a table."""
+    return Table(("", ""), [(name, text) for name, text in data.items()], names=2)

@@ -1,0 +1,267 @@
+"""The page of a study, and its pictures."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from qpmpc.report.columns import NONE, number
+from qpmpc.report.html import preformatted
+from qpmpc.report.study.figures import (
+    ABOVE_DP,
+    LIMITS,
+    MEASURES,
+    SAVING,
+    Measure,
+    Study,
+    main_measure,
+    study_table,
+    value_text,
+)
+from qpmpc.report.study.markdown import NO_RUNS, headline, interval_text
+from qpmpc.report.study.page import Section, Table, chosen, page, table_of
+from qpmpc.report.study.pictures import column_text, draw_distribution, draw_factor
+from qpmpc.report.study.worst import (
+    DRAWN,
+    MOST_FAILED,
+    Rerun,
+    commands,
+    draw_worst,
+    failed_table,
+    runs_table,
+    worst_runs,
+)
+from qpmpc.shown import shown
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+MOST_COLUMNS = 8  # of groups, in the table of factors
+
+
+def study_pictures(
+    frame: "DataFrame", summary: Mapping[str, Any], rerun: Rerun | None = None
+) -> tuple[dict[str, bytes], list[str]]:
+    """Draw the pictures of a study.
+
+    Parameters
+    ----------
+    frame : one row per run
+    summary : as `study_summary` returns it
+    rerun : drives the run of a row again, for the trajectories of the worst; None: without them
+
+    Returns
+    -------
+    pictures (PNG) by name, and a line for each that could not be made
+    """
+    table, columns = study_table(frame), summary["grouped_by"]
+    measure, _ = main_measure(table)
+    drawn = {
+        f"distribution_{each.key}": draw_distribution(table, columns, each)
+        for each in dict.fromkeys((measure, ABOVE_DP, SAVING))
+    }
+    for factor in summary["factors"]:
+        column = factor["column"]
+        drawn[f"factor_{column}"] = draw_factor(table, columns, measure, column)
+    worst: dict[str, bytes] = {}
+    remarks: list[str] = []
+    if rerun is not None:
+        worst, remarks = draw_worst(frame, table, measure, rerun)
+    return {name: data for name, data in drawn.items() if data is not None} | worst, remarks
+
+
+def study_page(
+    frame: "DataFrame",
+    study: Study,
+    summary: Mapping[str, Any],
+    pictures: Mapping[str, bytes],
+    remarks: list[str],
+) -> str:
+    """Return the report of a study.
+
+    Parameters
+    ----------
+    frame : one row per run
+    summary : as `study_summary` returns it
+    pictures, remarks : as `study_pictures` returns them
+    """
+    table = study_table(frame)
+    measure, _ = main_measure(table)
+    varied = ", ".join(column.removeprefix("set.") for column in study.varied)
+    quiet = f"Study of {study.runs:,} runs, seed {study.seed}. Varied: {varied or 'nothing'}."
+    sections = [
+        _first(study, summary),
+        Section("Distributions", _distribution_text(pictures), pictures=chosen(pictures, "distr")),
+        _factors(summary, pictures, measure),
+        _all_figures(summary),
+        _worst(frame, table, study, measure, pictures, remarks),
+        _failed(frame, table),
+        Section(
+            "What was run",
+            [_time_text(summary["time"])],
+            [table_of(summary["provenance"])] if summary["provenance"] else [],
+            texts=[
+                ("The study's file", preformatted("\n".join(map(shown, study.text.split("\n")))))
+            ],
+        ),
+    ]
+    return page(study.name, quiet, sections)
+
+
+def _first(study: Study, summary: Mapping[str, Any]) -> Section:
+    header, rows = headline(summary)
+    names = len(summary["grouped_by"])
+    title = f"{summary['main_measure']['title']}, {summary['main_measure']['unit']}"
+    title = title[0].upper() + title[1:]
+    return Section(
+        paragraphs=[*([study.description] if study.description else []), *counts_text(summary)],
+        tables=[Table(header, rows, names, title + " [95 % confidence interval]")] if rows else [],
+        remarks=summary["remarks"] if rows else [],
+    )
+
+
+def counts_text(summary: Mapping[str, Any]) -> list[str]:
+    """Return the counts of a study in plain words."""
+    counts = summary["counts"]
+    done, failed, missing = counts["done"], counts["failed"], counts["missing"]
+    if done + failed == 0:
+        return [NO_RUNS, *([f"{missing:,} runs were planned."] if missing else [])]
+    ends = "No run failed." if failed == 0 else f"{_runs(failed)} failed, see below."
+    texts = [f"{_runs(done)} finished of {counts['planned']:,} planned. {ends}"]
+    if missing:
+        texts[0] += f" {_runs(missing)} were not made: the study is not complete."
+    if done == 0:
+        return [*texts, "There are no figures: every run failed."]
+    by_limit = ", ".join(
+        f"{text} in {counts['violations'][limit]:,}"
+        for limit, text in LIMITS.items()
+        if counts["violations"][limit]
+    )
+    violated = counts["with_violation"]
+    texts.append(
+        (f"A limit was violated in {_runs(violated)}: {by_limit}." if violated else
+         "No limit was violated.")
+        + (f" A fallback drove for a second or more in {_runs(counts['with_fallback'])}."
+           if counts["with_fallback"] else " No fallback drove.")
+        + (f" {_runs(counts['not_comparable'])} cannot be compared in fuel."
+           if counts["not_comparable"] else "")
+    )  # fmt: skip
+    return texts
+
+
+def _runs(count: int) -> str:
+    return "1 run" if count == 1 else f"{count:,} runs"
+
+
+def _distribution_text(pictures: Mapping[str, bytes]) -> list[str]:
+    if any(name.startswith("distribution") for name in pictures):
+        return ["Left: share of the runs by value. Right: share of the runs up to a value."]
+    return ["No run has a figure to draw."]
+
+
+def _factors(
+    summary: Mapping[str, Any], pictures: Mapping[str, bytes], measure: Measure
+) -> Section:
+    title = f"What the {measure.title} depends on"
+    factors = summary["factors"]
+    if not factors:
+        return Section(
+            title, ["Nothing varies, or too few runs tell."], remarks=summary["factor_remarks"]
+        )
+    names = summary["grouped_by"]
+    groups = factors[0]["groups"][:MOST_COLUMNS]
+    fewest = min((each["n"] for each in groups if each["n"] > 1), default=2)
+    header = ["", *(f"{', '.join(value_text(g[n]) for n in names)} ({g['n']:,})" for g in groups)]
+    rows = [
+        [column_text(factor["column"]) + ("" if factor["numeric"] else " (categories)")]
+        + [number(each["correlation"], 2) for each in factor["groups"][:MOST_COLUMNS]]
+        for factor in factors
+    ]
+    left = len(factors[0]["groups"]) - len(groups)
+    return Section(
+        title,
+        [
+            "Numbers: Spearman's rank correlation. Categories: square root of the share of the "
+            "variance of the ranks that they explain. Strongest first. Chance alone gives sizes up "
+            f"to {1.96 / (fewest - 1) ** 0.5:.2f} in one of 20 correlations of {fewest:,} runs. A "
+            "correlation is no cause: what varies together shows the same.",
+            *([f"{left} more groups are in summary.json."] if left else []),
+        ],
+        [Table(header, rows)],
+        summary["factor_remarks"],
+        pictures=chosen(pictures, "factor"),
+    )
+
+
+def _all_figures(summary: Mapping[str, Any]) -> Section:
+    names = summary["grouped_by"]
+    tables = _figure_tables(summary["groups"], names)
+    folded = [
+        (f"By {column_text(column)}", _figure_tables(groups, [*names, column]))
+        for column, groups in summary["slices"].items()
+    ]
+    return Section("All figures", [] if tables else [NO_RUNS], tables, folded=folded)
+
+
+def _figure_tables(groups: list[dict[str, Any]], names: list[str]) -> list[Table]:
+    """Return a table for each measure that has values."""
+    tables = []
+    for measure in MEASURES:
+        keys = ("median", measure.tail[0], "worst", "mean")
+        rows = []
+        for group in groups:
+            figures = group["measures"][measure.key]
+            cells = [interval_text(figures, key, measure.digits) for key in keys]
+            if figures["n"]:
+                rows.append([*(value_text(group[n]) for n in names), f"{figures['n']:,}", *cells])
+        if rows:
+            header = [*(name.removeprefix("set.") for name in names), "n", *keys]
+            tables.append(Table(header, rows, len(names), measure.heading))
+    return tables
+
+
+def _worst(
+    frame: "DataFrame",
+    table: "DataFrame",
+    study: Study,
+    measure: Measure,
+    pictures: Mapping[str, bytes],
+    remarks: list[str],
+) -> Section:
+    worst = worst_runs(table, measure)
+    title = f"The worst runs by {measure.title}"
+    if len(worst) == 0:
+        return Section(title, [f"No run has a {measure.title}."])
+    drawn = chosen(pictures, "worst")
+    text = f"Of {', '.join(dict.fromkeys(worst['controller']))}; the references are left out."
+    return Section(
+        title,
+        [text, *([f"Drawn below: up to {DRAWN} of them, the worst first."] if drawn else [])],
+        [runs_table(worst, study.varied)],
+        remarks,
+        drawn,
+        commands(frame, worst),
+    )
+
+
+def _failed(frame: "DataFrame", table: "DataFrame") -> Section:
+    failed = table[table["failed"]]
+    if len(failed) == 0:
+        return Section("Failed runs", ["No run failed."])
+    shown_rows = failed.head(MOST_FAILED)
+    text = f"{_runs(len(failed))} failed"
+    text += f"; the first {MOST_FAILED} are shown." if len(failed) > MOST_FAILED else "."
+    return Section(
+        "Failed runs", [text], [failed_table(shown_rows)], texts=commands(frame, shown_rows)
+    )
+
+
+def _time_text(time: Mapping[str, float | None]) -> str:
+    rate, elapsed, outside = (
+        time[key] for key in ("runs_per_s", "elapsed_s", "share_outside_runs")
+    )
+    parts = [f"Computing time of all runs: {number(time['runs_total_s'], 1)} s"]
+    parts += [f"time from start to end: {elapsed:.1f} s"] if elapsed else []
+    parts += (
+        [f"{rate:.3g} runs per second" + ("" if elapsed else ", one at a time")] if rate else []
+    )
+    parts += [f"{100.0 * outside:.1f} % of it outside the runs"] if outside is not None else []
+    return ("; ".join(parts) or NONE) + "."
