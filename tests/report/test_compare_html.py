@@ -2,9 +2,9 @@
 
 import re
 from base64 import b64decode
-from html.parser import HTMLParser
 
 import pytest
+from pages import Page
 
 from qpmpc import __version__
 from qpmpc.controllers.settings import ControllerSettings
@@ -12,32 +12,6 @@ from qpmpc.report.columns import COMPARE_COLUMNS, filled
 from qpmpc.report.compare_html import compare_html
 from qpmpc.report.trajectories import draw_trajectories
 from qpmpc.results import compare_runs
-
-VOID = {"meta", "img", "br", "link"}
-
-
-class Page(HTMLParser):
-    """Checks nesting; collects tags with their attributes, and all text."""
-
-    def __init__(self, source: str) -> None:
-        super().__init__()
-        self.tags: list[tuple[str, dict]] = []
-        self.open: list[str] = []
-        self.text = ""
-        self.feed(source)
-        self.close()
-        assert self.open == []
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        self.text += data
 
 
 @pytest.fixture(scope="module")
