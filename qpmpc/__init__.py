@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from qpmpc.errors import QpmpcError as QpmpcError
     from qpmpc.results import Run as Run
     from qpmpc.simulation import simulate as simulate
+    from qpmpc.study.results import StudyResults as StudyResults
+    from qpmpc.study.sweep import sweep as sweep
     from qpmpc.trip import Observation as Observation
     from qpmpc.trip import Trip as Trip
     from qpmpc.vehicle import Command as Command
@@ -51,12 +53,14 @@ _HOME = {
     "RecedingHorizon": "controllers.receding_horizon",
     "Run": "results",
     "Runs": "comparison",
+    "StudyResults": "study.results",
     "Trip": "trip",
     "Vehicle": "vehicle",
     "compare": "comparison",
     "load_cycle": "cycles",
     "load_vehicle": "vehicle",
     "simulate": "simulation",
+    "sweep": "study.sweep",
 }
 
 __all__ = [*_HOME]

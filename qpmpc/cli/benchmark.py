@@ -40,7 +40,7 @@ def benchmark(
     chosen = candidates()
     if quick:
         chosen = tuple(c for c in chosen if c.label in QUICK)
-    with progress_bar(len(trips) * (len(chosen) + 1) + 1) as bar:
+    with progress_bar(2 * len(trips) + 1) as bar:
         result = run(trips, chosen, bar.next_job)
     write_json(result.as_data(), json_file)
     console = result_console(json_file)

@@ -20,7 +20,7 @@ def studies(
 
       qpmpc studies
 
-      qpmpc studies weather > my_study.toml
+      qpmpc studies weather
     """
     from qpmpc.cli.console import result_console
     from qpmpc.errors import InputError

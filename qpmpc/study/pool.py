@@ -186,6 +186,7 @@ def in_order(
     function: Callable[[Job], Result],
     jobs: Sequence[Job],
     progress: Callable[[int, int], None] | None = None,
+    count: int | None = None,
 ) -> list[Result]:
     """Do jobs in processes of this machine and return their results in the order of the jobs.
 
@@ -193,6 +194,7 @@ def in_order(
     ----------
     function : of one job; what it raises ends everything
     progress : called as progress(done, in all)
+    count : of processes; as many as there are processors if None
 
     Raises
     ------
@@ -200,7 +202,7 @@ def in_order(
         If a job kills its process.
     """
     found: dict[int, Result] = {}
-    workers = LocalWorkers()
+    workers = LocalWorkers(count)
     try:
         for (number, _), result in completed(partial(_each, function), [*enumerate(jobs)], workers):
             if isinstance(result, Lost):

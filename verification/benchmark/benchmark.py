@@ -2,10 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from qpmpc.controllers.base import Progress
 from qpmpc.report.provenance import provenance
+from qpmpc.study.pool import in_order
 from qpmpc.trip import Trip
 from qpmpc.verification.benchmark.candidates import RIVAL_TOLERANCE, Candidate
 from qpmpc.verification.benchmark.drive import Drive, drive
@@ -44,14 +46,14 @@ class Benchmark:
 
 
 def benchmark(trips: Sequence[Trip], chosen: Sequence[Candidate], next_job: Job) -> Benchmark:
-    """Drive every trip with every candidate, one after the other in one process.
+    """Drive every trip with every candidate, one after the other in one process of their own.
 
     Parameters
     ----------
     trips : all with one vehicle
     chosen : candidates
     next_job : announces a job and returns the function for its progress; called
-        len(trips) * (len(chosen) + 1) + 1 times
+        2 len(trips) + 1 times
     """
     drives, rows = [], []
     for trip in trips:
@@ -59,12 +61,16 @@ def benchmark(trips: Sequence[Trip], chosen: Sequence[Candidate], next_job: Job)
         report = next_job(f"{name}, dynamic programming")
         solution = solve_dp(trip.cycle, trip.vehicle, progress=as_fraction(report))
         dp_fuel_g = float(solution.fuel_g.sum())
-        for candidate in chosen:
-            report = next_job(f"{name}, {candidate.label}")
-            driven = drive(candidate, trip, REPETITIONS, report)
-            drives.append(driven)
-            rows.append(driven.row(dp_fuel_g))
+        report = next_job(f"{name}, {len(chosen)} candidates")
+        # in one process of their own, where nothing but the candidate runs
+        driven = in_order(partial(_drive, trip), chosen, report, count=1)
+        drives += driven
+        rows += [each.row(dp_fuel_g) for each in driven]
     report = next_job("growth over stages")
     grown = growth(trips[0].vehicle)
     report(1, 1)
     return Benchmark(drives, rows, grown)
+
+
+def _drive(trip: Trip, candidate: Candidate) -> Drive:
+    return drive(candidate, trip, REPETITIONS)

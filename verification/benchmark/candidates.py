@@ -1,12 +1,10 @@
 """The candidates: generated C and OSQP at fixed iteration counts, and rivals at a tolerance."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 
 from qpmpc.codegen.c_compiler import compiler
-from qpmpc.solvers.base import QpSolver
-from qpmpc.solvers.names import make_solver, solver_names
+from qpmpc.solvers.names import solver_names
 
 ITERATIONS = (10, 15, 25, 35, 50, 100, 200, 400)
 RHOS = (0.01, 0.03, 0.3, 1.0)
@@ -22,7 +20,8 @@ class Candidate:
     label : its name in tables
     family : its group, for colours and legends
     overrides : dotted settings of the controller
-    solver : makes the backend; OSQP with the settings' own values if None
+    solver : name of the backend, run to `RIVAL_TOLERANCE`; OSQP with the settings' own values if
+        None
     controller : name of the controller whose settings are used
     generated : whether it is the generated C controller, the default of `mh-qp`
     """
@@ -30,7 +29,7 @@ class Candidate:
     label: str
     family: str
     overrides: dict[str, object] = field(default_factory=dict)
-    solver: Callable[[], QpSolver] | None = None
+    solver: str | None = None
     controller: str = "mh-qp"
     generated: bool = False
 
@@ -59,7 +58,7 @@ def _generated(k: int) -> Candidate:
 
 
 def _rival(name: str) -> Candidate:
-    return Candidate(name, "rivals", solver=lambda: make_solver(name, RIVAL_TOLERANCE))
+    return Candidate(name, "rivals", solver=name)
 
 
 _MODULES = {"proxqp": "proxsuite", "highs": "highspy"}

@@ -8,14 +8,14 @@ import numpy as np
 
 from qpmpc.closed_loop import drive as drive_trip
 from qpmpc.codegen.controller import GeneratedController
-from qpmpc.controllers.base import Progress
 from qpmpc.controllers.qp_planner import QpPlanner, Solve
 from qpmpc.controllers.receding_horizon import RecedingHorizon
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.results import Run
 from qpmpc.solvers.base import Floats
+from qpmpc.solvers.names import make_solver
 from qpmpc.trip import Trip
-from qpmpc.verification.benchmark.candidates import Candidate
+from qpmpc.verification.benchmark.candidates import RIVAL_TOLERANCE, Candidate
 
 ENOUGH_MS = 10e3  # of decisions: no further repetition after that
 
@@ -70,12 +70,7 @@ def spread(times_ms: Floats) -> dict[str, float]:
     }
 
 
-def drive(
-    candidate: Candidate,
-    trip: Trip,
-    repetitions: int,
-    progress: Progress | None = None,
-) -> Drive:
+def drive(candidate: Candidate, trip: Trip, repetitions: int) -> Drive:
     """Drive a trip with a candidate `repetitions` times, or fewer if that takes long.
 
     Backends with their own iteration limit may need many seconds per cycle; they are driven in
@@ -84,15 +79,11 @@ def drive(
     settings = ControllerSettings().with_settings(candidate.overrides)
     steps: list[Floats] = []
     solves, updates = [], []
-    for repetition in range(repetitions):
+    for _ in range(repetitions):
         if sum(map(np.sum, steps)) > ENOUGH_MS:
             break
         solve_s: list[float] = []
         update_s: list[float] = []
-
-        def report(done: int, total: int, before: int = repetition) -> None:
-            if progress is not None:
-                progress(before * total + done, repetitions * total)
 
         if candidate.generated:
             in_c = GeneratedController(trip, settings)
@@ -102,7 +93,7 @@ def drive(
                 solve_s.append(driver.call_s)  # noqa: B023
                 update_s.append(driver.fill_s)  # noqa: B023
 
-            run = drive_trip(trip, in_c, on_step=watch, progress=report)
+            run = drive_trip(trip, in_c, on_step=watch)
         else:
 
             def keep(solve: Solve) -> None:
@@ -112,7 +103,7 @@ def drive(
 
             planner = _planner(candidate, trip, settings, keep)
             stages = planner.preview.count
-            run = drive_trip(trip, RecedingHorizon(trip, planner), progress=report)
+            run = drive_trip(trip, RecedingHorizon(trip, planner))
         steps.append(run.trajectory.step_time_s * 1e3)
         solves.append(np.array(solve_s) * 1e3)
         updates.append(np.array(update_s) * 1e3)
@@ -128,6 +119,6 @@ def _planner(
         settings,
         settings.mh_qp if is_ours else settings.mh_qp_paper,
         name=candidate.controller,
-        solver=None if candidate.solver is None else candidate.solver(),
+        solver=make_solver(candidate.solver, RIVAL_TOLERANCE) if candidate.solver else None,
         on_solve=keep,
     )
