@@ -33,7 +33,7 @@ class DpSettings(BaseModel):
 
     Attributes
     ----------
-    grid : `reference`, or `quick`, eight times as fast; see docs/dynamic_programming.md for errors
+    grid : `reference`, or `quick`, ten times as fast; see docs/dynamic_programming.md for errors
     soc_step, t_cl_step_k : cells of the coarse grid, 1 and K
     power_step_w : spacing of the engine power in the backward pass; the forward pass refines it
     refinement : cells of the tube in one coarse cell, along each axis. Each of these four, if
