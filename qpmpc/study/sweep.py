@@ -10,12 +10,12 @@ from time import perf_counter
 from typing import Any
 
 from qpmpc.errors import InputError, QpmpcError
+from qpmpc.pool import LocalWorkers, Lost, Workers, completed, prepare_process
 from qpmpc.study.cluster import ClusterWorkers
 from qpmpc.study.definition import Parameters, Study, as_study, load_study
 from qpmpc.study.identity import code_hash, versions
 from qpmpc.study.inputs import Inputs, read_inputs
 from qpmpc.study.journal import Row
-from qpmpc.study.pool import LocalWorkers, Lost, Workers, completed, prepare_process
 from qpmpc.study.results import StudyResults
 from qpmpc.study.run import lost_row, row_of
 from qpmpc.study.store import Store, trajectory_bytes

@@ -6,8 +6,8 @@ from functools import partial
 from typing import Any
 
 from qpmpc.controllers.base import Progress
+from qpmpc.pool import in_order
 from qpmpc.report.provenance import provenance
-from qpmpc.study.pool import in_order
 from qpmpc.trip import Trip
 from qpmpc.verification.benchmark.candidates import RIVAL_TOLERANCE, Candidate
 from qpmpc.verification.benchmark.drive import Drive, drive

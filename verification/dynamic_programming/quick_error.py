@@ -7,7 +7,6 @@ Markdown table. Nothing is taken from the cache: the times are those of solving,
 import argparse
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -18,11 +17,11 @@ from rich.progress import Progress
 from qpmpc.cycles import Cycle, cycle_names, load_cycle
 from qpmpc.errors import QpmpcError
 from qpmpc.files import check_file, json_text, write_text
+from qpmpc.pool import in_order
 from qpmpc.shown import shown
 from qpmpc.vehicle import load_vehicle, vehicle_names
 from qpmpc.verification.dynamic_programming.settings import DpSettings
 from qpmpc.verification.dynamic_programming.solve_dp import solve_dp
-from qpmpc.verification.dynamic_programming.threads import default_threads
 
 Row = dict[str, Any]
 
@@ -62,12 +61,13 @@ def compared(cycles: Sequence[str], vehicles: Sequence[str]) -> list[Row]:
     for cycle, vehicle in each:  # before any time is spent
         load_cycle(cycle)
         load_vehicle(vehicle)
-    with (
-        ProcessPoolExecutor(default_threads()) as pool,
-        Progress(console=Console(stderr=True), transient=True) as bar,
-    ):
-        found = pool.map(quick_and_reference, *zip(*each, strict=True))
-        return list(bar.track(found, total=len(each), description="both grids"))
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("both grids", total=len(each))
+        return in_order(_of_pair, each, lambda done, _: bar.update(task, completed=done))
+
+
+def _of_pair(pair: tuple[str, str]) -> Row:
+    return quick_and_reference(*pair)
 
 
 def quick_and_reference(cycle: str, vehicle: str) -> Row:

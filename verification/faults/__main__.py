@@ -10,7 +10,7 @@ from rich.progress import Progress
 
 from qpmpc.errors import InputError
 from qpmpc.files import write_text
-from qpmpc.study.pool import in_order
+from qpmpc.pool import in_order
 from qpmpc.vehicle import vehicle_names
 from qpmpc.verification.faults.standard import standard_faults
 from qpmpc.verification.faults.table import Row, measured, summary, table

@@ -8,10 +8,10 @@ import numpy as np
 
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle
+from qpmpc.pool import in_order
 from qpmpc.preview.forecast_errors import MODELS, forecast
 from qpmpc.results import Run
 from qpmpc.simulation import simulate
-from qpmpc.study.pool import in_order
 from qpmpc.vehicle.parameters import Vehicle
 
 CONTROLLER = "mh-qp"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from qpmpc.study.pool import AHEAD, BATCH_MAX, LocalWorkers, Lost, completed
+from qpmpc.pool import AHEAD, BATCH_MAX, LocalWorkers, Lost, completed
 
 WORKERS = 2
 
@@ -81,7 +81,7 @@ def test_workers_end_with_their_parent_even_if_it_is_killed(tmp_path: Path) -> N
     program = tmp_path / "parent.py"
     program.write_text(
         "import multiprocessing, time\n"
-        "from qpmpc.study.pool import LocalWorkers\n"
+        "from qpmpc.pool import LocalWorkers\n"
         "if __name__ == '__main__':\n"
         "    workers = LocalWorkers(1)\n"
         "    workers.submit(len, 'x').result()\n"
