@@ -3,8 +3,6 @@
 import math
 
 import numpy as np
-from scipy.ndimage import minimum_filter1d
-from scipy.signal import lfilter
 
 from qpmpc.cycles.cycle import Floats
 from qpmpc.cycles.trips.draws import Draws
@@ -52,6 +50,8 @@ def hills(draws: Draws, ground: str, steepest: Floats) -> Floats:
     -------
     rise over run, shape (n,)
     """
+    from scipy.signal import lfilter  # here: importing it takes a second
+
     margin = len(_WINDOW) // 2
     count = len(steepest) + 2 * margin
     sd = draws.uniform(*GRADE_SD[ground])
@@ -68,5 +68,6 @@ def hills(draws: Draws, ground: str, steepest: Floats) -> Floats:
         lags = np.abs(np.subtract.outer(np.arange(len(_WINDOW)), np.arange(len(_WINDOW))))
         variance += share * float(_WINDOW @ pole**lags @ _WINDOW)
     rough *= sd / math.sqrt(variance)
-    around = minimum_filter1d(np.pad(steepest, margin, mode="edge"), len(_WINDOW))
+    padded = np.pad(steepest, 2 * margin, mode="edge")
+    around = np.lib.stride_tricks.sliding_window_view(padded, len(_WINDOW)).min(axis=1)
     return np.convolve(around * np.tanh(rough / around), _WINDOW, "valid")

@@ -3,7 +3,6 @@
 from functools import cache
 
 import numpy as np
-from scipy.signal import lfilter
 
 from qpmpc.cycles.catalogue import catalogue
 from qpmpc.cycles.cycle import Floats
@@ -80,6 +79,8 @@ def draw_closing(draws: Draws, road: str, seconds: int) -> Floats | None:
 
 def slow_noise(draws: Draws, count: int, pole: float) -> Floats:
     """Smooth Gaussian noise of unit variance: white noise through a double pole."""
+    from scipy.signal import lfilter  # here: importing it takes a second
+
     settle = int(20.0 / (1.0 - pole))
     white = draws.normals(settle + count)
     smooth = lfilter([1.0], [1.0, -2.0 * pole, pole * pole], white)[settle:]

@@ -9,7 +9,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from qpmpc.cycles import Cycle
 from qpmpc.cycles.standstill import phases
@@ -36,6 +35,8 @@ def speed_noise(cycle: Cycle, rng: np.random.Generator) -> Cycle:
     AR(1) noise of speed is rough, and no driver accelerates like that (1.4 m/s^2 rms at 30 m/s).
     Stops stay stops.
     """
+    from scipy.signal import lfilter  # here: importing it takes a second
+
     pole = float(np.exp(-2.0 / NOISE_CORRELATION_S))
     burn_in = int(BURN_IN * NOISE_CORRELATION_S)
     white = rng.standard_normal(burn_in + len(cycle.speed_mps))
