@@ -68,6 +68,10 @@ class SafetyLayer:
                 on_excess.append(allowed.distance_w(running.low_w))
                 off_excess.append(allowed.distance_w(0.0))
             allowed_heat = self._heat_w(seen, margin)
+            if allowed_heat.low_w <= 0.0 and heat.most_w <= allowed_heat.high_w:
+                on_excess.append(0.0)  # kept at any power and without the engine: the usual case
+                off_excess.append(0.0)
+                continue
             by_heat = Interval(*map(heat.power_w, allowed_heat))
             running = running.narrowed(by_heat)
             kept = by_heat.low_w <= running.low_w <= by_heat.high_w  # whatever rounding leaves
@@ -133,6 +137,7 @@ class _EngineHeat:
         self._start_w = engine_w(vehicle.thermal, engine.lhv_j_per_g * starting_g_per_s, 0.0)
         self._fuel, self._fuel_g_per_s = plant.line.fuel, layer._fuel_g_per_s
         self._line_w = layer._power_w
+        self.most_w = self.of(engine.power_max_w)
 
     def of(self, p_eng_w: float) -> float:
         """Heat, W, at an engine power."""
