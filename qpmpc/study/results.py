@@ -61,7 +61,7 @@ class StudyResults:
     @property
     def description(self) -> str:
         """What it asks."""
-        return self.study.description
+        return " ".join(self.study.description.split())
 
     @property
     def seed(self) -> int:

@@ -157,6 +157,13 @@ def _remarks(table: "DataFrame", groups: Sequence[Group], measure: Measure) -> l
             f"Left out of every fuel figure, since they are not comparable: {excluded:,}. They may "
             "well be the worst."
         )
+    optima = table[(table["controller"] == OPTIMUM) & ~table["failed"]]
+    beyond = int((~optima["comparable"]).sum())
+    if beyond:
+        remarks.append(
+            f"Dynamic programming found no way to keep all limits in {beyond:,} of "
+            f"{len(optima):,} trips: those are beyond the car, and nothing is compared on them."
+        )
     if len(table):
         remarks.append(
             "Intervals are 95 % confidence intervals: of quantiles between two of the sorted "
