@@ -30,6 +30,10 @@ BATCH_MAX = 64
 AHEAD = 2  # batches under way for each process
 DEATHS_MAX = 2  # of processes that had nothing but one job
 SMOOTHING = 0.1  # of the mean time of a job
+NO_PROCESS = (
+    "no process can be started; a script must be a file, and what it does stand below "
+    "'if __name__ == \"__main__\":', since each process imports it"
+)
 THREADS_VARIABLE = "QPMPC_THREADS"
 
 
@@ -81,6 +85,7 @@ class LocalWorkers:
         self.slots = count or processes()
         self._others = set(multiprocessing.active_children())
         self._pool = self._new()
+        self._first: Future[None] | None = None  # which needs nothing but a process
 
     def _new(self) -> ProcessPoolExecutor:
         # spawned, not forked: compiled code may have threads by now
@@ -91,6 +96,8 @@ class LocalWorkers:
     def submit(self, function: Callable[[Any], Result], batch: Any) -> Future[Result]:
         """See `Workers`."""
         try:
+            if self._first is None:
+                self._first = self._pool.submit(_nothing)
             return self._pool.submit(function, batch)
         except BrokenProcessPool:
             self.close()
@@ -98,8 +105,22 @@ class LocalWorkers:
             return self._pool.submit(function, batch)
 
     def died(self, error: BaseException) -> bool:
-        """See `Workers`."""
-        return isinstance(error, BrokenProcessPool)
+        """See `Workers`.
+
+        Raises
+        ------
+        QpmpcError
+            If no process can be started at all.
+        """
+        if not isinstance(error, BrokenProcessPool):
+            return False
+        if self._first is not None and self._first.exception() is not None:
+            self.close()
+            self._pool = self._new()
+            self._first = self._pool.submit(_nothing)
+            if self._first.exception() is not None:
+                raise QpmpcError(NO_PROCESS)
+        return True
 
     def close(self) -> None:
         """See `Workers`."""
@@ -107,6 +128,10 @@ class LocalWorkers:
         for child in set(multiprocessing.active_children()) - self._others:
             child.kill()
         self._pool.shutdown(wait=True)
+
+
+def _nothing() -> None:
+    """Do nothing: a process that does it has started."""
 
 
 def _begin_worker() -> None:

@@ -107,3 +107,18 @@ def _lives(process: int) -> bool:
     except FileNotFoundError:
         return False
     return state != "Z"
+
+
+@pytest.mark.parametrize("how", ["without a guard", "without a file"])
+def test_a_script_whose_processes_cannot_start_is_told_why(tmp_path: Path, how: str) -> None:
+    """Each process imports the script, which starts processes again, or is not there."""
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from math import sqrt\nfrom qpmpc.pool import in_order\nin_order(sqrt, [1, 4], count=1)\n"
+    )
+    command = [sys.executable, *([script] if how == "without a guard" else ["-"])]
+    done = subprocess.run(
+        command, input=script.read_text(), capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 1
+    assert "no process can be started" in done.stderr.splitlines()[-1]

@@ -75,8 +75,8 @@ def report(
     if other is None:
         summary = first.summary()
         write_json(summary, json_file)
+        remarks = first.write_report(out)  # before the table, whose reader may leave
         print_study(console, summary)
-        remarks = first.write_report(out)
     else:
         if out is None:
             raise InputError("--out is needed for the comparison: name a folder")
@@ -84,7 +84,7 @@ def report(
         sides = (first.frame(), first, second.frame(), second)
         comparison = compare_studies(*sides)
         write_json(comparison, json_file)
-        print_comparison(console, comparison)
         remarks = write_study_comparison(*sides, out)
+        print_comparison(console, comparison)
     for remark in remarks:
         console.print(remark)

@@ -69,7 +69,8 @@ def sweep(
         )
     summary = results.summary()
     write_json(summary, json_file)
+    remarks = results.write_report()  # before the table, whose reader may leave
     console = result_console(json_file)
     print_study(console, summary)
-    for remark in results.write_report():
+    for remark in remarks:
         console.print(remark)

@@ -1,6 +1,7 @@
 """The processes of an existing Dask cluster."""
 
 import logging
+import re
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Future
 from contextlib import contextmanager, suppress
@@ -10,12 +11,15 @@ from time import monotonic
 from typing import Any, TypeVar
 
 from qpmpc.errors import InputError, QpmpcError
+from qpmpc.problems import shown_value
 
 Result = TypeVar("Result")
 
 REACH_S = 10.0  # in which a scheduler answers
 COUNT_S = 2.0  # between two counts of the workers
 WORKERS_S = 30.0  # in which its first worker is there
+PORT_MAX = 65_535
+_ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://\S+:([0-9]{1,5})/?", re.ASCII)
 
 
 class ClusterWorkers:
@@ -28,7 +32,7 @@ class ClusterWorkers:
     Raises
     ------
     InputError
-        If dask is not installed, or no scheduler answers, or it has no worker.
+        If dask is not installed, the address is none, no scheduler answers, or it has no worker.
     """
 
     def __init__(self, address: str) -> None:
@@ -36,6 +40,7 @@ class ClusterWorkers:
             raise InputError("a scheduler needs dask: pip install 'qpmpc-iptm[sweep]'")
         distributed: Any = import_module("distributed")
         self._address = address
+        _check_address(address)
         _quiet()
         try:
             self._client = distributed.Client(address, timeout=REACH_S, set_as_default=False)
@@ -97,6 +102,17 @@ class ClusterWorkers:
         with suppress(Exception):  # whatever state the connection is in
             self._executor.shutdown(wait=False)
             self._client.close(timeout=2)
+
+
+def _check_address(address: str) -> None:
+    """Refuse what a client would take long to fail with, and not in one line."""
+    found = _ADDRESS.fullmatch(address)
+    if found is None or int(found[2]) > PORT_MAX:
+        given = shown_value(address)
+        raise InputError(f"scheduler {given}: is no address, such as tcp://192.0.2.7:8786")
+    security: Any = import_module("distributed").Security()
+    if found[1] in ("tls", "wss") and not security.get_connection_args("client")["ssl_context"]:
+        raise InputError(f"scheduler {address}: dask's configuration has no certificates for TLS")
 
 
 def _quiet() -> None:

@@ -10,9 +10,11 @@ from itertools import product
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from qpmpc.cycles.trips import SETS, set_names
+from qpmpc.cycles.trips.names import SEEDS
 from qpmpc.errors import InputError
 from qpmpc.input_text import read_text
 from qpmpc.names import unknown
@@ -23,6 +25,7 @@ from qpmpc.vehicle.names import DEFAULT_VEHICLE
 
 MEGABYTES_MAX = 4
 RUNS_MAX = 1_000_000
+INTEGER_END = 2**63  # of the columns of Parquet
 OF_RUN = ("cycle", "vehicle", "controller", "forecast", "faults", "seed")
 FILES = ("cycle", "vehicle", "faults")  # keys whose values may be files
 TRUE_FORECAST = "true"
@@ -116,24 +119,38 @@ class Study(BaseModel):
                 raise ValueError(
                     f"unknown key {key!r}: use {', '.join(OF_RUN)} or a setting's dotted name"
                 )
-        for key, values in self.grid.items():
-            if len(set(map(repr, values))) < len(values):
-                raise ValueError(f"grid.{key} has a value twice")
-            kinds = {type(value) for value in self.values_of(key)}
+            values = self._given(key)
+            kinds = {type(value) for value in values}
             if len(kinds) > 1 and kinds != {int, float}:
                 raise ValueError(f"{key} has values of several kinds")
+            if any(type(value) is int and abs(value) >= INTEGER_END for value in values):
+                raise ValueError(f"{key} has an integer of more than 64 bits")
+        for key, values in self.grid.items():
+            if len(set(values)) < len(values):
+                raise ValueError(f"grid.{key} has a value twice")
         for key in OF_RUN:
             for value in self.values_of(key):
                 if isinstance(value, str) == (key == "seed") or isinstance(value, bool):
                     kind = "an integer" if key == "seed" else "text"
                     raise ValueError(f"{key} must be {kind} (given: {value!r})")
-                if key == "seed" and not (isinstance(value, int) and 0 <= value < 2**31):
+                if key == "seed" and not (isinstance(value, int) and 0 <= value < SEEDS):
                     raise ValueError(f"seed must be an integer, 0 or more (given: {value!r})")
-        if not self.values_of("cycle"):
-            raise ValueError("no cycle: give it in fixed, grid, points or sample")
+        self._check_cycles(places["points"])
+        if self.sample and "seed" not in self.keys and self.seed + self.sample.count > SEEDS:
+            raise ValueError(f"seed + count is {self.seed + self.sample.count}, at most {SEEDS}")
         if self.combinations > RUNS_MAX:
             raise ValueError(f"{self.combinations} combinations, at most {RUNS_MAX} are allowed")
         return self
+
+    def _check_cycles(self, of_points: set[str]) -> None:
+        if not self.values_of("cycle"):
+            raise ValueError("no cycle: give it in fixed, grid, points or sample")
+        without = [i for i, point in enumerate(self.points, start=1) if "cycle" not in point]
+        if "cycle" in of_points and without:
+            raise ValueError(f"no cycle in point {without[0]}: give one in each, or in none")
+        for one in (self.fixed, *self.points):
+            if one.get("cycle") in SETS:
+                raise ValueError(f"cycle {one['cycle']!r} is a set of trips: give it in grid")
 
     @property
     def combinations(self) -> int:
@@ -162,12 +179,15 @@ class Study(BaseModel):
 
     def values_of(self, key: str) -> list[Value]:
         """Return all values that a key takes; of an interval both ends."""
+        return list(dict.fromkeys(self._given(key)))
+
+    def _given(self, key: str) -> list[Value]:
         found: list[Value] = [self.fixed[key]] if key in self.fixed else []
         found += self.grid.get(key, [])
         found += [point[key] for point in self.points if key in point]
         if self.sample and key in self.sample.values:
             found += self.sample.values[key].ends
-        return list(dict.fromkeys(found))
+        return found
 
     def kind_of(self, key: str) -> type:
         """Return the type of a key's values: bool, int, float or str."""
@@ -187,6 +207,7 @@ class Study(BaseModel):
     def _combinations(self) -> Iterator[dict[str, Any]]:
         sampled = points_of(self.sample, self.seed) if self.sample else iter([{}])
         points = self.points or [{}]
+        first = cache(self._first_equal)
         for i, values in enumerate(sampled):
             for number, point in enumerate(points):
                 for indices in product(*(range(len(v)) for v in self.grid.values())):
@@ -197,20 +218,19 @@ class Study(BaseModel):
                     again = any(
                         j and key in idle for key, j in zip(self.grid, indices, strict=True)
                     )
-                    if again or number != self._first_equal(controller, number):
+                    if again or number != first(controller)[number]:
                         continue
                     yield _combined({k: v for k, v in keys.items() if k not in idle}, self.seed + i)
 
-    def _first_equal(self, controller: str, number: int) -> int:
-        """Return the first point that is the same to a controller."""
-        if not self.points:
-            return number
-
-        def seen(point: Mapping[str, Value]) -> dict[str, Value]:
-            return {k: v for k, v in point.items() if _has_effect(controller, k)}
-
-        mine = seen(self.points[number])
-        return next(j for j in range(number + 1) if seen(self.points[j]) == mine)
+    def _first_equal(self, controller: str) -> list[int]:
+        """Return for each point the first that is the same to a controller."""
+        firsts: dict[frozenset[tuple[str, Value]], int] = {}
+        return [
+            firsts.setdefault(
+                frozenset((k, v) for k, v in point.items() if _has_effect(controller, k)), number
+            )
+            for number, point in enumerate(self.points or [{}])
+        ]
 
 
 def _combined(keys: Mapping[str, Value], seed: int) -> dict[str, Any]:
@@ -286,10 +306,19 @@ def as_study(data: Mapping[str, Any], owner: str = "study", folder: Path | None 
 
 
 def _located(value: Any, folder: Path, key: str = "") -> Any:
-    """Put the folder before the files in a study's tables, and trips for sets of trips."""
+    """Put the folder before the files in a study's tables, and trips for sets of trips.
+
+    What Python has more than TOML, arrays of numpy, tuples and paths, becomes TOML's.
+    """
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    elif isinstance(value, tuple | range):
+        value = list(value)
+    elif isinstance(value, os.PathLike):
+        value = os.fspath(value)
     if isinstance(value, Mapping):
         names = {k: key if k in KINDS else str(k) for k in value}
-        return {k: _located(inner, folder, names[k]) for k, inner in value.items()}
+        return {str(k): _located(inner, folder, names[k]) for k, inner in value.items()}
     if isinstance(value, list):
         each = _expanded(value) if key == "cycle" else value
         return [_located(inner, folder, key) for inner in each]
@@ -309,8 +338,8 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key, value in table.items():
         is_table = isinstance(value, Mapping) and value and not set(value) <= set(KINDS)
-        if is_table:
-            found |= _flat(value, f"{prefix}{key}.")
-        else:
-            found[prefix + key] = value
+        inner = _flat(value, f"{prefix}{key}.") if is_table else {prefix + key: value}
+        for again in set(inner) & set(found):
+            raise ValueError(f"{again} is given twice, with quotes and without")
+        found |= inner
     return found

@@ -12,7 +12,7 @@ from qpmpc.errors import InputError
 from qpmpc.faults.models import Faults, load_faults
 from qpmpc.preview.forecast_errors import MODELS
 from qpmpc.registry import check_controllers, split_settings
-from qpmpc.study.definition import TRUE_FORECAST, Study, with_seed
+from qpmpc.study.definition import OF_RUN, TRUE_FORECAST, Study, with_seed
 from qpmpc.vehicle import Vehicle, load_vehicle
 from qpmpc.vehicle.names import DEFAULT_VEHICLE, VEHICLES
 
@@ -94,10 +94,13 @@ def read_inputs(study: Study) -> Inputs:
 
 
 def _check_settings(study: Study, controllers: list[str], vehicles: list[Vehicle]) -> None:
-    """Check every value of every setting, the others at their first."""
-    first = {key: study.values_of(key)[0] for key in study.settings}
-    for key in first:
-        for value in study.values_of(key):
-            of_vehicle, _ = split_settings({**first, key: value}, controllers)
-            for vehicle in vehicles if of_vehicle else []:
-                vehicle.with_settings(of_vehicle)
+    """Check every point, and every value of every other setting, the rest at their first."""
+    points = [{k: v for k, v in p.items() if k not in OF_RUN} for p in study.points] or [{}]
+    of_points = {key for point in points for key in point}
+    others = [key for key in study.settings if key not in of_points]
+    first = {key: study.values_of(key)[0] for key in others}
+    each = [{**points[0], **first, key: v} for key in others for v in study.values_of(key)]
+    for together in [*({**first, **point} for point in points), *each]:
+        of_vehicle, _ = split_settings(together, controllers)
+        for vehicle in vehicles if of_vehicle else []:
+            vehicle.with_settings(of_vehicle)

@@ -37,6 +37,8 @@ class Journal:
             If it cannot be written; the journal is then as it was before.
         """
         line = _line(row)
+        if not os.fstat(self._handle).st_nlink:
+            raise OSError(errno.ENOENT, "deleted while the study was running", str(self._file))
         try:
             if os.write(self._handle, line) != len(line):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -59,9 +61,9 @@ def rows_in(file: Path) -> Iterator[Row]:
     for line in content.split(b"\n")[:-1]:
         try:
             row = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):
             continue
-        if isinstance(row, dict) and isinstance(row.get("run"), int):
+        if isinstance(row, dict) and type(row.get("run")) is int:
             yield row
 
 

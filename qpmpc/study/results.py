@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,13 +19,12 @@ from qpmpc.study.definition import OF_RUN, Parameters, Study
 from qpmpc.study.inputs import Inputs, read_inputs
 from qpmpc.study.journal import rows_in
 from qpmpc.study.run import rerun
-from qpmpc.study.store import JOURNAL, SESSIONS, STUDY, part_files
+from qpmpc.study.store import JOURNAL, SESSIONS, STUDY, part_files, part_table, table_of
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 
-@dataclass(frozen=True)
 class StudyResults:
     """The folder of a study.
 
@@ -39,7 +38,8 @@ class StudyResults:
         If it holds no study.
     """
 
-    folder: Path
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
+        self.folder = Path(folder)
 
     @cached_property
     def study(self) -> Study:
@@ -49,7 +49,7 @@ class StudyResults:
             data = json.loads(file.read_text("utf-8"))["study"]
         except FileNotFoundError:
             raise InputError(f"{self.folder}: holds no study ({STUDY})") from None
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             raise InputError(f"{file}: cannot be read as a study's") from None
         return validated(Study, data, os.fspath(file))
 
@@ -86,17 +86,24 @@ class StudyResults:
     @cached_property
     def provenance(self) -> dict[str, str]:
         """Versions and machine of this process, and the time of the whole; rows have their own."""
-        sessions = [json.loads(line) for line in self._sessions.splitlines()]
-        if not sessions:
+        elapsed_s, workers = [], []
+        for line in self._sessions.splitlines():
+            with suppress(ValueError, KeyError, TypeError, RecursionError):  # a line cut off
+                session = json.loads(line)
+                elapsed_s.append(float(session["elapsed_s"]))
+                workers.append(str(session["workers"]))
+        if not workers:
             return provenance()
-        elapsed_s = sum(float(each["elapsed_s"]) for each in sessions)
-        workers = ", ".join(dict.fromkeys(str(each["workers"]) for each in sessions))
-        return {**provenance(), "workers": workers, "elapsed_s": f"{elapsed_s:.1f}"}
+        return {
+            **provenance(),
+            "workers": ", ".join(dict.fromkeys(workers)),
+            "elapsed_s": f"{sum(elapsed_s):.1f}",
+        }
 
     @property
     def _sessions(self) -> str:
         try:
-            return (self.folder / SESSIONS).read_text("utf-8")
+            return (self.folder / SESSIONS).read_text("utf-8", errors="replace")
         except OSError:
             return ""
 
@@ -138,12 +145,12 @@ class StudyResults:
         """
         import pandas as pd
         import pyarrow as pa
-        import pyarrow.parquet as parquet
 
         form = schema(self.study)
-        tables = [parquet.read_table(file, schema=form) for file in part_files(self.folder)]
-        latest = [{**row} for row in rows_in(self.folder / JOURNAL)]
-        table = pa.concat_tables([*tables, pa.Table.from_pylist(latest, form)])
+        # the journal first: its rows move into a part, not back
+        latest = table_of([*rows_in(self.folder / JOURNAL)], form, self.folder / JOURNAL)
+        tables = [part_table(file, schema=form) for file in part_files(self.folder)]
+        table = pa.concat_tables([*tables, latest])
         frame: DataFrame = table.to_pandas()
         for key in self.study.settings:
             if self.study.kind_of(key) is int:  # which pandas makes floats of, beside nothing
@@ -153,7 +160,9 @@ class StudyResults:
         by_trip = pd.DataFrame({"trip": frame["trip_hash"], "m": balanced})
         of_dp = by_trip[frame["controller"] == OPTIMUM].groupby("trip")["m"]
         of_rules = by_trip[frame["controller"] == REFERENCE].groupby("trip")["m"]
-        optimum, rule = (frame["trip_hash"].map(m) for m in (of_dp.min(), of_rules.first()))
+        optimum, rule = (
+            frame["trip_hash"].map(m).astype(float) for m in (of_dp.min(), of_rules.first())
+        )
         frame["fuel_above_dp_percent"] = 100.0 * (balanced / optimum - 1.0)
         frame["saving_vs_rule_percent"] = 100.0 * (1.0 - balanced / rule)
         return frame

@@ -35,7 +35,8 @@ def rerun(parameters: Parameters, inputs: Inputs) -> Run:
 def row_of(parameters: Parameters, inputs: Inputs) -> tuple[dict[str, Any], Run | None]:
     """Drive a run and return its row, by the names of `columns`, and the run if it succeeded.
 
-    An exception is no reason to stop a study: its text is the row's `error`.
+    Whatever a run raises is no reason to stop a study, nor is a controller that exits: its text is
+    the row's `error`.
     """
     run, found = None, _parameters(parameters)
     start = perf_counter()
@@ -44,7 +45,7 @@ def row_of(parameters: Parameters, inputs: Inputs) -> tuple[dict[str, Any], Run 
         found |= _hashes(parameters, inputs, trip)
         run = _drive(parameters, inputs, trip, chosen)
         found |= _figures(run)
-    except Exception as error:
+    except (Exception, SystemExit, KeyboardInterrupt) as error:
         name = "" if type(error).__module__.startswith("qpmpc.") else f"{type(error).__name__}: "
         found["error"] = shown(f"{name}{error}")[:LONGEST_ERROR]
     found["wall_s"] = perf_counter() - start

@@ -5,11 +5,27 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+    model_validator,
+)
 
 from qpmpc.errors import InputError
 
-Value = bool | int | float | str
+
+def _one_value(value: Any, parse: ValidatorFunctionWrapHandler) -> Any:
+    try:
+        return parse(value)
+    except ValidationError:  # of each of the four
+        raise ValueError("must be a finite number, a text, true or false") from None
+
+
+Value = Annotated[bool | int | float | str, WrapValidator(_one_value)]
 Values = Annotated[list[Value], Field(min_length=1)]
 
 KINDS = ("uniform", "choice", "each")

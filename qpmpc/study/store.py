@@ -12,7 +12,7 @@ from contextlib import suppress
 from fcntl import LOCK_EX, LOCK_NB, flock
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from qpmpc.errors import InputError
 from qpmpc.files import check_folder, json_text, replace_file, write_bytes, write_text
@@ -22,9 +22,13 @@ from qpmpc.study.columns import schema
 from qpmpc.study.definition import Study
 from qpmpc.study.journal import Journal, Row, finite, rows_in
 
+if TYPE_CHECKING:
+    import pyarrow
+
 STUDY, SESSIONS, JOURNAL, LOCK = "study.json", "sessions.jsonl", "journal.jsonl", "lock"
 PARTS, TRAJECTORIES = "runs", "trajectories"
 PART_ROWS = 2_000
+MARK = "qpmpc"  # key of what the results of a part depend on
 
 
 class Store:
@@ -53,22 +57,29 @@ class Store:
         self, folder: Path, study: Study, identity: dict[str, str], resume: bool = False
     ) -> None:
         check_folder(folder, "--out")
-        self.folder, self._schema = folder, schema(study)
+        mark = {MARK: json.dumps(identity)}
+        self.folder, self._schema = folder, schema(study).with_metadata(mark)
         held = folder / STUDY
         if held.exists():
             _check_same(held, identity, resume)
         folder.mkdir(parents=True, exist_ok=True)
         self._lock = _locked(folder)
         try:
-            if not held.exists():
+            if held.exists():  # by a process that has ended since
+                _check_same(held, identity, resume)
+            else:
                 data = {"study": study.model_dump(exclude_none=True), "identity": identity}
                 write_text(held, json_text(data))
             (folder / PARTS).mkdir(exist_ok=True)
             self.finished = bytearray(study.combinations)
             self.failed = 0
-            for number, error in _in_parts(folder):
+            for number, error in _in_parts(folder, mark):
                 self._note(number, error)
-            self._rows = [r for r in rows_in(folder / JOURNAL) if not self.finished[r["run"]]]
+            rows = [*rows_in(folder / JOURNAL)]
+            table_of(rows, self._schema, folder / JOURNAL)
+            if not all(0 <= row["run"] < len(self.finished) for row in rows):
+                raise _damaged(folder / JOURNAL)
+            self._rows = [row for row in rows if not self.finished[row["run"]]]
             for row in self._rows:
                 self._note(row["run"], row.get("error"))
             self._journal = Journal(folder / JOURNAL, self._rows)
@@ -121,13 +132,16 @@ class Store:
             file.write(json.dumps(session) + "\n")
 
     def _make_part(self) -> None:
+        import pyarrow.parquet as parquet
+
         if not self._rows:
             return
         rows = sorted(map(finite, self._rows), key=lambda row: int(row["run"]))
         numbers = [int(file.stem.partition("-")[2]) for file in part_files(self.folder)]
         name = f"part-{max(numbers, default=-1) + 1:05d}.parquet"
-        content = _parquet(rows, self._schema)
-        replace_file(self.folder / PARTS / name, content, durable=True)
+        into = BytesIO()
+        parquet.write_table(table_of(rows, self._schema, name), into, compression="zstd")
+        replace_file(self.folder / PARTS / name, into.getvalue(), durable=True)
         self._rows = []
 
     def _note(self, number: int, error: str | None) -> None:
@@ -151,28 +165,50 @@ def trajectory_bytes(run: Run) -> bytes:
     return into.getvalue()
 
 
-def _in_parts(folder: Path) -> Iterator[tuple[int, str | None]]:
-    """Yield number and error of each run in the parts."""
-    import pyarrow.parquet as parquet
-    from pyarrow import ArrowException
+def table_of(rows: list[Row], columns: "pyarrow.Schema", file: Path | str) -> "pyarrow.Table":
+    """Return rows as a table.
 
-    for file in part_files(folder):
-        try:
-            table = parquet.read_table(file, columns=["run", "error"])
-        except (ArrowException, OSError) as error:
-            raise InputError(
-                f"{file}: damaged: delete it, and --resume repeats its runs"
-            ) from error
-        yield from zip(table["run"].to_pylist(), table["error"].to_pylist(), strict=True)
+    Raises
+    ------
+    InputError
+        If they are not of these columns: somebody else wrote into the file.
+    """
+    import pyarrow as pa
+
+    try:
+        return pa.Table.from_pylist(rows, columns)
+    except (pa.ArrowException, OverflowError) as error:
+        raise _damaged(file) from error
 
 
-def _parquet(rows: list[Row], columns: Any) -> bytes:
+def part_table(file: Path, **how: Any) -> "pyarrow.Table":
+    """Return a part, read as `pyarrow.parquet.read_table` does.
+
+    Raises
+    ------
+    InputError
+        If it is damaged.
+    """
     import pyarrow as pa
     import pyarrow.parquet as parquet
 
-    into = BytesIO()
-    parquet.write_table(pa.Table.from_pylist(rows, columns), into, compression="zstd")
-    return into.getvalue()
+    try:
+        return parquet.read_table(file, **how)
+    except (pa.ArrowException, OSError) as error:
+        raise _damaged(file) from error
+
+
+def _in_parts(folder: Path, mark: dict[str, str]) -> Iterator[tuple[int, str | None]]:
+    """Yield number and error of each run in the parts."""
+    for file in part_files(folder):
+        table = part_table(file, columns=["run", "error"])
+        if (table.schema.metadata or {}).get(MARK.encode()) != mark[MARK].encode():
+            raise InputError(f"{file}: is a part of another study: move it away")
+        yield from zip(table["run"].to_pylist(), table["error"].to_pylist(), strict=True)
+
+
+def _damaged(file: Path | str) -> InputError:
+    return InputError(f"{file}: damaged: delete it, and --resume repeats its runs")
 
 
 def _check_same(file: Path, identity: dict[str, str], resume: bool) -> None:
@@ -183,7 +219,7 @@ def _check_same(file: Path, identity: dict[str, str], resume: bool) -> None:
     try:
         held = json.loads(file.read_text("utf-8"))["identity"]
         differ = [what for what, now in identity.items() if held.get(what) != now]
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{file}: cannot be read as a study's") from error
     if differ:
         then = f" (then {held['versions']}; now {identity['versions']})"

@@ -22,6 +22,7 @@ from qpmpc.study.store import Store, trajectory_bytes
 
 NEEDED = ("pyarrow", "pandas")
 FOLDER = Path("results")
+WORKERS_MAX = 1024
 
 StudyLike = str | os.PathLike[str] | Mapping[str, Any] | Study
 Progress = Callable[[int, int, int], None]
@@ -63,8 +64,8 @@ def sweep(
             raise InputError(f"studies need {package}: pip install 'qpmpc-iptm[sweep]'")
     if workers is not None and scheduler is not None:
         raise InputError("workers are those of the scheduler: give one of the two")
-    if workers is not None and workers < 1:
-        raise InputError(f"workers must be 1 or more (given: {workers})")
+    if workers is not None and not 1 <= workers <= WORKERS_MAX:
+        raise InputError(f"workers must be 1 to {WORKERS_MAX} (given: {workers})")
     chosen = _study(study)
     inputs = read_inputs(chosen)
     folder = FOLDER / chosen.name if out is None else Path(out)

@@ -99,7 +99,7 @@ def test_an_unreachable_scheduler_is_one_line_and_leaves_nothing(
 ) -> None:
     monkeypatch.setattr("qpmpc.study.cluster.REACH_S", 0.5)
     for address in ("tcp://127.0.0.1:9", "no address", "tcp://127.0.0.1"):
-        with pytest.raises(InputError, match="cannot be reached") as refused:
+        with pytest.raises(InputError, match=r"cannot be reached|is no address") as refused:
             sweep(QUICK, tmp_path / "out", scheduler=address)
         assert "\n" not in str(refused.value)
         assert not (tmp_path / "out").exists()

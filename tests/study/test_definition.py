@@ -1,12 +1,15 @@
 """Studies: their files, and the parameters of their runs."""
 
+import time
 from collections import Counter
+from datetime import date
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from qpmpc.errors import InputError
@@ -80,6 +83,7 @@ def test_samples_have_their_seed_and_do_not_depend_on_their_number() -> None:
     assert len({run.settings["thermal.t_amb_degc"] for run in many}) == 10
 
 
+@settings(deadline=None)  # the first one imports scipy
 @given(st.integers(2, 40), st.integers(0, 1000))
 def test_a_latin_hypercube_has_one_sample_in_each_stratum(count: int, seed: int) -> None:
     values = {"trip.soc_init": {"uniform": [0.4, 0.8]}, "thermal.t_amb_degc": {"uniform": [0, 1]}}
@@ -102,6 +106,30 @@ def test_a_set_stands_for_its_trips_and_a_random_trip_gets_the_seed() -> None:
     seeds = {"grid": {"seed": [7, 8]}, "fixed": {"cycle": "random-600s"}}
     runs = as_study({"name": "a", **seeds}).runs()
     assert [run.cycle for run in runs] == ["random-7-600s", "random-8-600s"]
+
+
+def test_what_python_has_more_than_toml_is_taken() -> None:
+    made = as_study(
+        {
+            "name": "a",
+            "fixed": {"cycle": Path("my.csv"), "trip.soc_init": np.float64(0.5)},
+            "grid": {"seed": range(2), "thermal.t_amb_degc": np.arange(2), "vehicle": ("a", "b")},
+        }
+    )
+    runs = list(made.runs())
+    assert (runs[0].cycle, runs[-1].seed, len(runs)) == ("my.csv", 1, 8)
+    assert runs[-1].settings == {"trip.soc_init": 0.5, "thermal.t_amb_degc": 1}
+
+
+def test_many_points_take_no_long_time() -> None:
+    """Comparing each with each in every sample would take hours."""
+    made = study(
+        points=[{"trip.soc_init": 0.4 + 1e-4 * i} for i in range(1000)],
+        sample={"count": 20, "values": {"thermal.t_amb_degc": {"uniform": [-15, 10]}}},
+    )
+    before = time.process_time()
+    assert made.count == 20_000
+    assert time.process_time() - before < 5.0
 
 
 def test_files_are_looked_for_from_the_folder_of_the_study(tmp_path: Path) -> None:
@@ -133,6 +161,21 @@ def test_files_are_looked_for_from_the_folder_of_the_study(tmp_path: Path) -> No
             {"grid": {"seed": list(range(1001)), "thermal.x": list(range(1000))}},
             "at most",
         ),
+        ({"fixed": {}, "points": [{"cycle": "nycc"}, {"seed": 1}]}, "no cycle in point 2"),
+        ({"fixed": {"cycle": "train"}}, "set of trips: give it in grid"),
+        ({"points": [{"thermal.t_amb_degc": 1}, {"thermal.t_amb_degc": True}]}, "several kinds"),
+        ({"grid": {"rule_based.balance": [True, 1]}}, "several kinds"),
+        ({"grid": {"thermal.t_amb_degc": [1, 1.0]}}, "a value twice"),
+        ({"grid": {"rule_based.on_w": [2**63]}}, "64 bits"),
+        ({"grid": {"thermal.t_amb_degc": 1, "thermal": {"t_amb_degc": 2}}}, "given twice"),
+        ({"grid": {"trip.soc_init": [[0.5]]}}, "finite number, a text, true or false$"),
+        ({"grid": {"trip.soc_init": [date(2020, 1, 1)]}}, "finite number, a text, true or false$"),
+        ({"grid": {"trip.soc_init": [float("nan")]}}, "finite number"),
+        ({"grid": {3: [1]}}, "unknown key '3'"),
+        (
+            {"seed": 2**31 - 1, "sample": {"count": 2, "values": {"vehicle": {"choice": ["a"]}}}},
+            "seed [+] count",
+        ),
     ],
 )
 def test_a_wrong_study_is_refused_in_one_line(tables: dict[str, Any], said: str) -> None:
@@ -159,6 +202,18 @@ def test_what_it_names_is_checked_before_the_first_run(tables: dict[str, Any], s
     with pytest.raises(InputError, match=said) as refused:
         read_inputs(study(**tables))
     assert "\n" not in str(refused.value)
+
+
+def test_the_values_of_a_point_are_checked_together() -> None:
+    """The window of one point would be none with an end of the other."""
+    windows = [(0.3, 0.4), (0.6, 0.7)]
+    points = [
+        {"battery.soc_min": low, "battery.soc_max": high, "trip.soc_init": (low + high) / 2}
+        for low, high in windows
+    ]
+    read_inputs(study(points=points))
+    with pytest.raises(InputError, match="soc_m"):
+        read_inputs(study(points=[*points, {"battery.soc_min": 0.9, "battery.soc_max": 0.8}]))
 
 
 @pytest.mark.parametrize("name", shipped_studies())

@@ -1,6 +1,7 @@
 """A study's folder: what is written stays, and is read once."""
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from qpmpc.errors import InputError
 from qpmpc.study import store as module
 from qpmpc.study.definition import as_study
 from qpmpc.study.results import StudyResults
-from qpmpc.study.store import JOURNAL, Store, part_files
+from qpmpc.study.store import JOURNAL, PARTS, SESSIONS, Store, part_files
 
 STUDY = as_study(
     {
@@ -124,6 +125,94 @@ def test_a_damaged_part_is_named(tmp_path: Path) -> None:
     part_files(tmp_path)[0].write_bytes(b"PAR1")
     with pytest.raises(InputError, match=r"part-00000\.parquet: damaged"):
         opened(tmp_path, resume=True)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b'{"run": 10000, "cycle": "nycc"}',
+        b'{"run": -1}',
+        b'{"run": 2, "cycle": [1]}',
+        b'{"run": 2, "seed": 1e300}',
+        b'{"run": 2, "seed": 100000000000000000000}',
+    ],
+)
+def test_a_journal_with_what_is_no_run_is_named(tmp_path: Path, line: bytes) -> None:
+    opened(tmp_path).close()
+    (tmp_path / JOURNAL).write_bytes(line + b"\n")
+    with pytest.raises(InputError, match=f"{JOURNAL}: damaged"):
+        opened(tmp_path, resume=True)
+    (tmp_path / JOURNAL).unlink()
+    opened(tmp_path, resume=True).close()
+
+
+def test_noise_in_a_journal_is_no_run(tmp_path: Path) -> None:
+    opened(tmp_path).close()
+    noise = b'\xff\xfe\n{"run": true}\n[1]\nnull\n{"run": 1.5}\n' + b"[" * 100_000 + b"\n"
+    (tmp_path / JOURNAL).write_bytes(noise + json.dumps(row(3)).encode() + b"\n")
+    assert numbers(tmp_path) == [3]
+    store = opened(tmp_path, resume=True)
+    assert sum(store.finished) == 1
+    store.close()
+
+
+def test_a_part_of_another_study_is_named(tmp_path: Path) -> None:
+    other = Store(tmp_path / "other", STUDY, {**IDENTITY, "runs": "z"})
+    other.add(row(0))
+    other.close()
+    opened(tmp_path / "mine").close()
+    (part,) = part_files(tmp_path / "other")
+    part.rename(tmp_path / "mine" / PARTS / part.name)
+    with pytest.raises(InputError, match=f"{part.name}: is a part of another study"):
+        opened(tmp_path / "mine", resume=True)
+
+
+def test_a_damaged_part_is_named_by_the_report_too(tmp_path: Path) -> None:
+    store = opened(tmp_path)
+    store.add(row(0))
+    store.close()
+    part_files(tmp_path)[0].write_bytes(b"PAR1")
+    with pytest.raises(InputError, match=r"part-00000\.parquet: damaged"):
+        StudyResults(tmp_path).frame()
+
+
+def test_a_deleted_folder_is_noticed_at_the_next_run(tmp_path: Path) -> None:
+    store = opened(tmp_path / "gone")
+    store.add(row(0))
+    shutil.rmtree(tmp_path / "gone")
+    with pytest.raises(FileNotFoundError, match=f"deleted while.*{JOURNAL}"):
+        store.add(row(1))
+    with pytest.raises(FileNotFoundError):
+        store.close()
+
+
+@pytest.mark.parametrize("line", [b'{"runs": 3', b"null", b"\xff\xff", b"[" * 100_000])
+def test_a_session_that_was_cut_off_does_not_matter(tmp_path: Path, line: bytes) -> None:
+    store = opened(tmp_path)
+    store.add_session(1, 2.0, 3)
+    store.close()
+    with (tmp_path / SESSIONS).open("ab") as file:
+        file.write(line + b"\n")
+    found = StudyResults(tmp_path).provenance
+    assert (found["workers"], found["elapsed_s"]) == ("3", "2.0")
+
+
+@pytest.mark.parametrize("text", ["{}", "[", "[" * 100_000, '{"study": 1, "identity": 2}'])
+def test_a_broken_study_json_is_named(tmp_path: Path, text: str) -> None:
+    opened(tmp_path).close()
+    (tmp_path / "study.json").write_text(text)
+    with pytest.raises(InputError, match=r"study\.json"):
+        StudyResults(tmp_path).frame()
+    with pytest.raises(InputError, match=r"study\.json: cannot be read"):
+        opened(tmp_path, resume=True)
+
+
+def test_a_study_without_any_run_has_an_empty_table_and_a_report(tmp_path: Path) -> None:
+    opened(tmp_path).close()
+    results = StudyResults(tmp_path)
+    assert results.frame().empty
+    results.write_report()
+    assert (tmp_path / "summary.json").exists()
 
 
 def test_a_folder_without_a_study_is_refused(tmp_path: Path) -> None:

@@ -17,8 +17,12 @@ from pandas.testing import assert_frame_equal
 from quick_study import QUICK, as_toml, values
 
 import qpmpc
+from qpmpc.names import Shipped
+from qpmpc.registry import CONTROLLERS
 from qpmpc.study.columns import columns
 from qpmpc.study.definition import as_study
+from qpmpc.study.inputs import Inputs
+from qpmpc.study.run import row_of
 from qpmpc.study.store import JOURNAL, part_files
 from qpmpc.study.sweep import sweep
 
@@ -66,6 +70,26 @@ def test_failures_are_recorded_and_the_others_go_on(tmp_path: Path) -> None:
     assert frame["error"].notna().tolist() == [True, False, False, False]
     assert "t_cl_init_degc" in frame["error"][0]
     assert frame["fuel_g"].isna().tolist() == [True, False, False, False]
+
+
+class Leaving(qpmpc.Controller):
+    name = "leaving"
+    error: BaseException
+
+    def step(self, seen: qpmpc.Observation) -> qpmpc.Command:
+        raise self.error
+
+
+@pytest.mark.parametrize("error", [SystemExit(3), KeyboardInterrupt(), MemoryError()])
+def test_a_controller_that_leaves_is_a_run_that_failed(
+    monkeypatch: pytest.MonkeyPatch, error: BaseException
+) -> None:
+    monkeypatch.setitem(CONTROLLERS.shipped, "leaving", Shipped(f"{__name__}:Leaving"))
+    monkeypatch.setattr(Leaving, "error", error, raising=False)
+    (run,) = as_study({"name": "a", "fixed": {"cycle": "nycc", "controller": "leaving"}}).runs()
+    row, made = row_of(run, Inputs())
+    assert made is None
+    assert row["error"].startswith(type(error).__name__)
 
 
 def test_trajectories_are_kept_on_request(tmp_path: Path) -> None:

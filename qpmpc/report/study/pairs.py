@@ -253,8 +253,8 @@ def _remarks(
     unlike = sum(pair[FUEL] is None for pair in pairs)
     if unlike:
         remarks.append(
-            f"{unlike:,} pairs have no difference in fuel: one of the two failed or is not "
-            "comparable."
+            f"{unlike:,} {'pair has' if unlike == 1 else 'pairs have'} no difference in fuel: "
+            "one of the two failed or is not comparable."
         )
     if pairs:
         remarks.append(

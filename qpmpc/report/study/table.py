@@ -6,6 +6,7 @@ from typing import Any
 from rich.console import Console
 
 from qpmpc.report.study.markdown import NO_RUNS, headline
+from qpmpc.report.study.pairs import FUEL
 from qpmpc.report.study.pairs_tables import comparison_table
 from qpmpc.report.table import print_texts
 
@@ -24,6 +25,6 @@ def print_study(console: Console, summary: Mapping[str, Any]) -> None:
 
 def print_comparison(console: Console, comparison: Mapping[str, Any]) -> None:
     """Print what `compare_studies` found: one row per vehicle and controller, then its remarks."""
-    print_texts(console, *comparison_table(comparison, "fuel_soc_balanced_percent"))
+    print_texts(console, *comparison_table(comparison, FUEL))
     for remark in comparison["remarks"]:
         console.print(remark)

@@ -1,6 +1,7 @@
 """The runs of a study that a reader should look at: the worst, and those that failed."""
 
 from collections.abc import Callable, Mapping, Sequence
+from math import isclose
 from typing import TYPE_CHECKING, Any
 
 from qpmpc.report.columns import NONE, number
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 WORST, DRAWN, MOST_FAILED = 10, 3, 20
+SAME = 1e-6  # relative difference of fuel on other processors
 LONGEST = 300  # characters of an error
 
 Rerun = Callable[[Mapping[str, Any]], Run]
@@ -98,8 +100,15 @@ def draw_worst(
         there = [] if is_nothing(row["trip_hash"]) else best["trip_hash"] == row["trip_hash"]
         places = [place, *best[there].index[:1]] if len(there) else [place]
         try:
-            runs = [rerun(frame.iloc[each].to_dict()) for each in places]
+            rows = [frame.iloc[each].to_dict() for each in places]
+            runs = [rerun(each) for each in rows]
             pictures[f"worst_{i}"] = draw_trajectories(runs)
+            remarks += [
+                f"run {each['run']} burns {run.fuel_g:.4g} g when it is driven again, not "
+                f"{each['fuel_g']:.4g} g: a file that it needs, or the code, has changed"
+                for each, run in zip(rows, runs, strict=True)
+                if not isclose(run.fuel_g, each["fuel_g"], rel_tol=SAME)
+            ]
         # whatever a user's own controller raises: the report has the rest
         except Exception as error:
             reason = short(f"{type(error).__name__}: {error}", LONGEST)
