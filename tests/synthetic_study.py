@@ -18,6 +18,7 @@ class Study:
     runs: int = 0
     text: str = 'name = "winter trips"\n'
     varied: Sequence[str] = ("cycle", "seed", "set.thermal.t_amb_degc")
+    remarks: tuple[str, ...] = ()
     provenance: dict[str, str] = field(default_factory=lambda: {"qpmpc-iptm": "0.1"})
 
 

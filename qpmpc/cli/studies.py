@@ -26,7 +26,7 @@ def studies(
     from qpmpc.errors import InputError
     from qpmpc.names import unknown
     from qpmpc.report.table import print_texts
-    from qpmpc.study.definition import load_study, shipped_studies, shipped_text
+    from qpmpc.study.load import load_study, shipped_studies, shipped_text
 
     if name is not None:
         if name not in shipped_studies():

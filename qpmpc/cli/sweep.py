@@ -59,6 +59,7 @@ def sweep(
     """
     from qpmpc.cli.console import result_console, study_progress, write_json
     from qpmpc.cli.inputs import check_outputs
+    from qpmpc.errors import QpmpcError
     from qpmpc.report.study.table import print_study
     from qpmpc.study.sweep import sweep as run
 
@@ -74,3 +75,5 @@ def sweep(
     print_study(console, summary)
     for remark in remarks:
         console.print(remark)
+    if summary["counts"]["failed"] and not summary["counts"]["done"]:
+        raise QpmpcError(f"every run failed, see error in {results.folder / 'report.html'}")

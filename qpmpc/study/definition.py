@@ -1,35 +1,24 @@
 """What a study runs: its file, and the parameters of each of its runs."""
 
-import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
-from importlib import resources
 from itertools import product
-from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from qpmpc.cycles.trips import SETS, set_names
+from qpmpc.cycles.trips import SETS
 from qpmpc.cycles.trips.names import SEEDS
-from qpmpc.errors import InputError
-from qpmpc.input_text import read_text
-from qpmpc.names import unknown
 from qpmpc.registry import reads
-from qpmpc.settings import load_toml, validated
 from qpmpc.study.sampling import KINDS, Sample, Value, points_of
 from qpmpc.vehicle.names import DEFAULT_VEHICLE
 
-MEGABYTES_MAX = 4
 RUNS_MAX = 1_000_000
 INTEGER_END = 2**63  # of the columns of Parquet
 OF_RUN = ("cycle", "vehicle", "controller", "forecast", "faults", "seed")
-FILES = ("cycle", "vehicle", "faults")  # keys whose values may be files
 TRUE_FORECAST = "true"
-_SHIPPED = resources.files("qpmpc.study") / "shipped"
 _RANDOM = re.compile(r"random(-[0-9]+s)?")
 
 
@@ -177,6 +166,12 @@ class Study(BaseModel):
         """Keys that are settings."""
         return tuple(key for key in self.keys if key not in OF_RUN)
 
+    @property
+    def idle(self) -> tuple[str, ...]:
+        """Keys that have no effect on any controller of the study."""
+        names = [str(name) for name in self.values_of("controller")] or ["mh-qp"]
+        return tuple(k for k in self.keys if not any(_has_effect(name, k) for name in names))
+
     def values_of(self, key: str) -> list[Value]:
         """Return all values that a key takes; of an interval both ends."""
         return list(dict.fromkeys(self._given(key)))
@@ -257,80 +252,6 @@ def _has_effect(controller: str, key: str) -> bool:
     if key in OF_RUN and key != "forecast":
         return True
     return reads(controller, key)
-
-
-def load_study(name_or_path: str | os.PathLike[str]) -> Study:
-    """Load a study: a shipped name or a TOML file with the keys of `Study`.
-
-    Files that it names are looked for from its own folder.
-
-    Raises
-    ------
-    InputError
-        If there is no such study or file, or a key or value is not allowed; one line.
-    """
-    name = os.fspath(name_or_path)
-    if name in shipped_studies():
-        return as_study(load_toml(shipped_text(name), name), name)
-    path = Path(name)
-    if path.suffix == "" and path.name == name and not os.path.exists(name):  # noqa: PTH110
-        raise InputError(unknown("study", name, shipped_studies(), ", or a .toml file"))
-    text = read_text(path, MEGABYTES_MAX, "study ")
-    return as_study(load_toml(text, name), name, path.parent)
-
-
-def shipped_studies() -> tuple[str, ...]:
-    """Return the names of the studies that come with the package."""
-    return tuple(sorted(f.name.removesuffix(".toml") for f in _SHIPPED.iterdir()))
-
-
-def shipped_text(name: str) -> str:
-    """Return the file of a shipped study."""
-    return (_SHIPPED / f"{name}.toml").read_text("utf-8")
-
-
-def as_study(data: Mapping[str, Any], owner: str = "study", folder: Path | None = None) -> Study:
-    """Make a study of a mapping with the keys of `Study`.
-
-    Parameters
-    ----------
-    owner : for messages
-    folder : from which the files it names are looked for; the current one if None
-
-    Raises
-    ------
-    InputError
-        If a key or value is not allowed.
-    """
-    return validated(Study, _located(dict(data), folder or Path()), owner)
-
-
-def _located(value: Any, folder: Path, key: str = "") -> Any:
-    """Put the folder before the files in a study's tables, and trips for sets of trips.
-
-    What Python has more than TOML, arrays of numpy, tuples and paths, becomes TOML's.
-    """
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    elif isinstance(value, tuple | range):
-        value = list(value)
-    elif isinstance(value, os.PathLike):
-        value = os.fspath(value)
-    if isinstance(value, Mapping):
-        names = {k: key if k in KINDS else str(k) for k in value}
-        return {str(k): _located(inner, folder, names[k]) for k, inner in value.items()}
-    if isinstance(value, list):
-        each = _expanded(value) if key == "cycle" else value
-        return [_located(inner, folder, key) for inner in each]
-    is_file = key in FILES and isinstance(value, str) and (Path(value).suffix or "/" in value)
-    return str(folder / value) if is_file else value
-
-
-def _expanded(cycles: list[Any]) -> list[Any]:
-    found: list[Any] = []
-    for name in cycles:
-        found += set_names(name) if isinstance(name, str) and name in SETS else [name]
-    return found
 
 
 def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

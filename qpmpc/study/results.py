@@ -120,6 +120,11 @@ class StudyResults:
     def _inputs(self) -> Inputs:
         return read_inputs(self.study)
 
+    @property
+    def remarks(self) -> list[str]:
+        """What a reader should know about the study, one line each."""
+        return remarks_on(self.study)
+
     def summary(self) -> dict[str, Any]:
         """Return the figures of the study as plain data; see `study_summary`."""
         return study_summary(self.frame(), self)
@@ -166,6 +171,12 @@ class StudyResults:
         frame["fuel_above_dp_percent"] = 100.0 * (balanced / optimum - 1.0)
         frame["saving_vs_rule_percent"] = 100.0 * (1.0 - balanced / rule)
         return frame
+
+
+def remarks_on(study: Study) -> list[str]:
+    """Return what a user should know about a study, one line each."""
+    idle = study.idle
+    return [f"no effect on any controller of the study: {', '.join(idle)}"] if idle else []
 
 
 def parameters_of(row: Mapping[str, Any]) -> Parameters:

@@ -11,12 +11,14 @@ from typing import Any
 
 from qpmpc.errors import InputError, QpmpcError
 from qpmpc.pool import LocalWorkers, Lost, Workers, completed, prepare_process
+from qpmpc.remarks import say_once
 from qpmpc.study.cluster import ClusterWorkers
-from qpmpc.study.definition import Parameters, Study, as_study, load_study
+from qpmpc.study.definition import Parameters, Study
 from qpmpc.study.identity import code_hash, versions
 from qpmpc.study.inputs import Inputs, read_inputs
 from qpmpc.study.journal import Row
-from qpmpc.study.results import StudyResults
+from qpmpc.study.load import as_study, load_study
+from qpmpc.study.results import StudyResults, remarks_on
 from qpmpc.study.run import lost_row, row_of
 from qpmpc.study.store import Store, trajectory_bytes
 
@@ -68,6 +70,8 @@ def sweep(
         raise InputError(f"workers must be 1 to {WORKERS_MAX} (given: {workers})")
     chosen = _study(study)
     inputs = read_inputs(chosen)
+    for remark in remarks_on(chosen):
+        say_once(remark)
     folder = FOLDER / chosen.name if out is None else Path(out)
     pool: Workers = LocalWorkers(workers) if scheduler is None else ClusterWorkers(scheduler)
     try:

@@ -13,7 +13,7 @@ from pandas.testing import assert_frame_equal
 from quick_study import QUICK, as_toml, values
 
 from qpmpc.errors import InputError, QpmpcError
-from qpmpc.study.definition import as_study, load_study
+from qpmpc.study.load import as_study, load_study
 from qpmpc.study.store import part_files
 from qpmpc.study.sweep import sweep
 

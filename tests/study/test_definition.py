@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from qpmpc.errors import InputError
-from qpmpc.study.definition import as_study, load_study, shipped_studies
 from qpmpc.study.inputs import read_inputs
+from qpmpc.study.load import as_study, load_study, shipped_studies
 
 SMALL: dict[str, Any] = {"name": "small", "fixed": {"cycle": "nycc"}}
 
@@ -56,6 +56,20 @@ def test_a_setting_without_effect_makes_no_further_run() -> None:
     assert Counter(run.controller for run in runs) == {"mh-qp": 6, "rule-based": 1, "dp": 1}
     assert next(run for run in runs if run.controller == "dp").settings == {}
     assert made.count == len(runs)
+
+
+def test_keys_without_effect_on_any_controller_are_named() -> None:
+    made = study(
+        fixed={
+            "cycle": "nycc",
+            "controller": "rule-based",
+            "ecms.factor": 2.0,
+            "trip.soc_init": 0.5,
+        },
+        grid={"forecast": ["true", "shift"], "rule_based.on_w": [6e3, 8e3]},
+    )
+    assert set(made.idle) == {"ecms.factor", "forecast"}
+    assert made.count == 2
 
 
 def test_points_that_a_controller_cannot_tell_apart_are_run_once() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import qpmpc
-from qpmpc.study.definition import load_study
+from qpmpc.study.load import load_study
 
 DOCS = Path(__file__).parents[2] / "docs"
 README = DOCS.parent / "README.md"

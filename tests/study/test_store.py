@@ -10,7 +10,7 @@ import pytest
 
 from qpmpc.errors import InputError
 from qpmpc.study import store as module
-from qpmpc.study.definition import as_study
+from qpmpc.study.load import as_study
 from qpmpc.study.results import StudyResults
 from qpmpc.study.store import JOURNAL, PARTS, SESSIONS, Store, part_files
 

@@ -20,8 +20,8 @@ import qpmpc
 from qpmpc.names import Shipped
 from qpmpc.registry import CONTROLLERS
 from qpmpc.study.columns import columns
-from qpmpc.study.definition import as_study
 from qpmpc.study.inputs import Inputs
+from qpmpc.study.load import as_study
 from qpmpc.study.run import row_of
 from qpmpc.study.store import JOURNAL, part_files
 from qpmpc.study.sweep import sweep

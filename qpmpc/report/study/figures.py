@@ -33,6 +33,7 @@ class Study(Protocol):
     runs : number planned
     text : the study's file
     varied : columns of the table that the study varies
+    remarks : what a reader should know about it, one line each
     provenance : name and text; `elapsed_s`, the time from the first start to the last end, and
         `workers` are used where they are given
     """
@@ -49,6 +50,8 @@ class Study(Protocol):
     def text(self) -> str: ...  # noqa: D102
     @property
     def varied(self) -> Sequence[str]: ...  # noqa: D102
+    @property
+    def remarks(self) -> Sequence[str]: ...  # noqa: D102
     @property
     def provenance(self) -> Mapping[str, str]: ...  # noqa: D102
 

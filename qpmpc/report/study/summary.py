@@ -78,7 +78,7 @@ def study_summary(frame: "DataFrame", study: Study) -> dict[str, Any]:
         },
         "factors": factors,
         "factor_remarks": more,
-        "remarks": [why, *remarks, *_remarks(table, groups, measure)],
+        "remarks": [why, *study.remarks, *remarks, *_remarks(table, groups, measure)],
         "provenance": {str(name): str(text) for name, text in study.provenance.items()},
     }
 
