@@ -77,7 +77,7 @@ def _write_page(
         write_bytes(folder / f"{_file_name(picture)}.png", content)
     write_text(folder / f"{name}.html", html)
     page = folder / f"{name}.html"
-    return [f"{page} written, with {data}.json, {data}.md and {len(pictures)} pictures", *remarks]
+    return [f"{page} written, with its pictures, {data}.json and {data}.md", *remarks]
 
 
 def _file_name(name: str) -> str:
