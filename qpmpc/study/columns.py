@@ -18,7 +18,7 @@ PARAMETERS: dict[str, type] = {
     "faults": str,
     "seed": int,
 }
-FLAGS: dict[str, type] = {f"flags.{flag.name}": int for flag in Flag}
+FLAGS: dict[str, type] = {f"flags.{name}": int for flag in Flag for name in flag.names()}
 FIGURES: dict[str, type] = {
     "duration_s": int,
     "distance_km": float,

@@ -53,8 +53,10 @@ def test_every_figure_of_a_run_has_a_column(whole: Path) -> None:
     from qpmpc.study.columns import flat
 
     known = columns(as_study({"name": "a", "fixed": {"cycle": "nycc"}}))
-    found = flat(qpmpc.simulate("nycc", "mh-qp").summary())
-    assert {key for key in found if not key.startswith("flags.")} <= set(known)
+    broken = [{"kind": "nan", "signal": "soc", "at_s": 50, "for_s": 3}]
+    found = flat(qpmpc.simulate("nycc", "mh-qp", faults=broken).summary())
+    assert any(key.startswith("flags.") for key in found)
+    assert {key for key in found if not key.startswith("faults.")} <= set(known)
     table = parquet.read_table(part_files(whole)[0])
     assert set(table.column_names) >= set(known)
 

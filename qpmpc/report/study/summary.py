@@ -158,7 +158,7 @@ def _remarks(table: "DataFrame", groups: Sequence[Group], measure: Measure) -> l
             "well be the worst."
         )
     optima = table[(table["controller"] == OPTIMUM) & ~table["failed"]]
-    beyond = int((~optima["comparable"]).sum())
+    beyond = int(optima["violated"].sum())
     if beyond:
         remarks.append(
             f"Dynamic programming found no way to keep all limits in {beyond:,} of "
