@@ -38,7 +38,7 @@ from qpmpc.solvers.osqp import Osqp
 from qpmpc.solvers.qoco import Qoco
 from qpmpc.trip import Trip
 from qpmpc.vehicle import Plant
-from qpmpc.vehicle.engine import OptimalLine
+from qpmpc.vehicle.engine import OptimalLine, optimal_line
 from qpmpc.verification.checks import (
     Context,
     Group,
@@ -143,8 +143,8 @@ MUTATIONS = [
         (bounds_hold,),
     ),
     Mutation(
-        "battery curve fitted to terminal power", qpmpc.pwa.model, "battery_samples",
-        "maps.internal_power_w(vehicle.trip.soc_init, power)", "power", (bounds_hold,),
+        "battery curve fitted to terminal power", qpmpc.pwa.model, "_battery_samples",
+        "BatteryMaps(battery).internal_power_w(soc, power)", "power", (bounds_hold,),
     ),
     # preview
     Mutation(
@@ -307,6 +307,17 @@ def mutate(monkeypatch: pytest.MonkeyPatch, mutation: Mutation | Replacement) ->
     names = dict(function.__globals__)
     exec(source.replace(mutation.old, mutation.new), names)
     monkeypatch.setattr(mutation.owner, mutation.name, names[mutation.name])
+
+
+@pytest.fixture(autouse=True)
+def nothing_kept():
+    """Curves are kept by their parameters: those of a mutation must not meet those of another."""
+    kept = (qpmpc.pwa.model._fuel, qpmpc.pwa.model._battery, qpmpc.pwa.model._alpha, optimal_line)
+    for function in kept:
+        function.cache_clear()
+    yield
+    for function in kept:
+        function.cache_clear()
 
 
 @pytest.mark.parametrize("mutation", MUTATIONS, ids=lambda mutation: mutation.title)
