@@ -75,7 +75,7 @@ def report(
     if other is None:
         summary = first.summary()
         write_json(summary, json_file)
-        remarks = first.write_report(out)  # before the table, whose reader may leave
+        remarks = first.write_report(out, summary)  # before the table, whose reader may leave
         print_study(console, summary)
     else:
         if out is None:

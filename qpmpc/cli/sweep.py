@@ -70,7 +70,7 @@ def sweep(
         )
     summary = results.summary()
     write_json(summary, json_file)
-    remarks = results.write_report()  # before the table, whose reader may leave
+    remarks = results.write_report(summary=summary)  # before the table, whose reader may leave
     console = result_console(json_file)
     print_study(console, summary)
     for remark in remarks:

@@ -129,15 +129,20 @@ class StudyResults:
         """Return the figures of the study as plain data; see `study_summary`."""
         return study_summary(self.frame(), self)
 
-    def write_report(self, folder: str | os.PathLike[str] | None = None) -> list[str]:
+    def write_report(
+        self,
+        folder: str | os.PathLike[str] | None = None,
+        summary: dict[str, Any] | None = None,
+    ) -> list[str]:
         """Write report.html, pictures, summary.json and summary.md; returns remarks.
 
         Parameters
         ----------
         folder : the study's own if None
+        summary : as `summary` returned it, where the caller has it
         """
         into = self.folder if folder is None else Path(folder)
-        return write_study(self.frame(), self, into, self.rerun)
+        return write_study(self.frame(), self, into, self.rerun, summary)
 
     def frame(self) -> "DataFrame":
         """Return all rows, sorted by `run`, with two columns more.

@@ -1,14 +1,19 @@
-"""One run of a study: from its parameters to its row."""
+"""What a worker does: runs of a study, from their parameters to their rows."""
 
 import json
+from collections.abc import Sequence
 from hashlib import sha256
+from io import BytesIO
 from time import perf_counter
 from typing import Any
 
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle
+from qpmpc.errors import QpmpcError
+from qpmpc.pool import prepare_process
 from qpmpc.preview.forecast_errors import forecast
 from qpmpc.registry import split_settings
+from qpmpc.report.trajectory_csv import trajectory_csv
 from qpmpc.results import Run
 from qpmpc.shown import shown
 from qpmpc.simulation import simulate
@@ -30,6 +35,29 @@ def rerun(parameters: Parameters, inputs: Inputs) -> Run:
     Whatever makes the run impossible.
     """
     return _drive(parameters, inputs, *_trip(parameters, inputs))
+
+
+def run_batch(
+    code: str, inputs: Inputs, trajectories: bool, batch: Sequence[Parameters]
+) -> list[tuple[tuple[dict[str, Any], bytes | None], float]]:
+    """Make several runs, in a worker.
+
+    Raises
+    ------
+    QpmpcError
+        If the worker has other code than the process that wants the results.
+    """
+    if code_hash() != code:
+        raise QpmpcError(
+            "a worker has other code than this process: install the same version on both"
+        )
+    prepare_process()
+    done = []
+    for parameters in batch:
+        row, run = row_of(parameters, inputs)
+        table = _trajectory_bytes(run) if trajectories and run is not None else None
+        done.append(((row, table), float(row["wall_s"])))
+    return done
 
 
 def row_of(parameters: Parameters, inputs: Inputs) -> tuple[dict[str, Any], Run | None]:
@@ -121,3 +149,14 @@ def _figures(run: Run) -> dict[str, Any]:
     found["duration_s"] = len(run.trajectory.fuel_g)
     found["faults_effect"] = None if effect is None else json.dumps(effect)
     return found
+
+
+def _trajectory_bytes(run: Run) -> bytes:
+    """Return a trajectory as a Parquet file, with the columns of its CSV file."""
+    import pyarrow.csv as csv
+    import pyarrow.parquet as parquet
+
+    into = BytesIO()
+    table = csv.read_csv(BytesIO(trajectory_csv(run).encode()))
+    parquet.write_table(table, into, compression="zstd")
+    return into.getvalue()

@@ -16,8 +16,6 @@ from typing import TYPE_CHECKING, Any
 
 from qpmpc.errors import InputError
 from qpmpc.files import check_folder, json_text, replace_file, write_bytes, write_text
-from qpmpc.report.trajectory_csv import trajectory_csv
-from qpmpc.results import Run
 from qpmpc.study.columns import schema
 from qpmpc.study.definition import Study
 from qpmpc.study.journal import Journal, Row, finite, rows_in
@@ -152,17 +150,6 @@ class Store:
 def part_files(folder: Path) -> list[Path]:
     """Return the parts of a study's folder, in the order in which they were written."""
     return sorted((folder / PARTS).glob("part-*.parquet"))
-
-
-def trajectory_bytes(run: Run) -> bytes:
-    """Return a trajectory as a Parquet file, with the columns of its CSV file."""
-    import pyarrow.csv as csv
-    import pyarrow.parquet as parquet
-
-    into = BytesIO()
-    table = csv.read_csv(BytesIO(trajectory_csv(run).encode()))
-    parquet.write_table(table, into, compression="zstd")
-    return into.getvalue()
 
 
 def table_of(rows: list[Row], columns: "pyarrow.Schema", file: Path | str) -> "pyarrow.Table":

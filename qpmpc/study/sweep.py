@@ -1,7 +1,7 @@
 """Run a study: its runs in many processes, their rows on disk."""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from hashlib import sha256
 from importlib.util import find_spec
@@ -9,18 +9,17 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from qpmpc.errors import InputError, QpmpcError
-from qpmpc.pool import LocalWorkers, Lost, Workers, completed, prepare_process
+from qpmpc.errors import InputError
+from qpmpc.pool import LocalWorkers, Lost, Workers, completed
 from qpmpc.remarks import say_once
 from qpmpc.study.cluster import ClusterWorkers
-from qpmpc.study.definition import Parameters, Study
+from qpmpc.study.definition import Study
 from qpmpc.study.identity import code_hash, versions
 from qpmpc.study.inputs import Inputs, read_inputs
-from qpmpc.study.journal import Row
 from qpmpc.study.load import as_study, load_study
 from qpmpc.study.results import StudyResults, remarks_on
-from qpmpc.study.run import lost_row, row_of
-from qpmpc.study.store import Store, trajectory_bytes
+from qpmpc.study.run import lost_row, run_batch
+from qpmpc.study.store import Store
 
 NEEDED = ("pyarrow", "pandas")
 FOLDER = Path("results")
@@ -28,7 +27,6 @@ WORKERS_MAX = 1024
 
 StudyLike = str | os.PathLike[str] | Mapping[str, Any] | Study
 Progress = Callable[[int, int, int], None]
-Done = tuple[Row, bytes | None]
 
 
 def sweep(
@@ -134,26 +132,3 @@ def _run_all(
         if progress is not None:
             progress(done, total, failed)
     store.add_session(done - before, perf_counter() - begun, workers.slots)
-
-
-def run_batch(
-    code: str, inputs: Inputs, trajectories: bool, batch: Sequence[Parameters]
-) -> list[tuple[Done, float]]:
-    """Make several runs, in a worker.
-
-    Raises
-    ------
-    QpmpcError
-        If the worker has other code than the process that wants the results.
-    """
-    if code_hash() != code:
-        raise QpmpcError(
-            "a worker has other code than this process: install the same version on both"
-        )
-    prepare_process()
-    done = []
-    for parameters in batch:
-        row, run = row_of(parameters, inputs)
-        table = trajectory_bytes(run) if trajectories and run is not None else None
-        done.append(((row, table), float(row["wall_s"])))
-    return done

@@ -3,6 +3,7 @@
 import os
 
 from qpmpc.errors import InputError
+from qpmpc.pool import THREADS_VARIABLE, processes
 from qpmpc.problems import shown_value
 
 THREADS_MAX = 1024
@@ -16,16 +17,13 @@ def default_threads() -> int:
     InputError
         If the variable is set to anything but an integer of 1 to 1024.
     """
-    given = os.environ.get("QPMPC_THREADS")
+    given = os.environ.get(THREADS_VARIABLE)
     if given:
         number = int(given) if given.isascii() and given.isdecimal() and len(given) <= 4 else 0
         if not 1 <= number <= THREADS_MAX:
             raise InputError(
-                f"QPMPC_THREADS: must be an integer from 1 to {THREADS_MAX} "
+                f"{THREADS_VARIABLE}: must be an integer from 1 to {THREADS_MAX} "
                 f"(given: {shown_value(given)})"
             )
         return number
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not every system has it
-        return os.cpu_count() or 1
+    return processes()

@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from qpmpc.files import json_text, write_bytes, write_text
 from qpmpc.report.study.figures import Study
@@ -22,7 +22,11 @@ LONGEST_NAME = 100
 
 
 def write_study(
-    frame: "DataFrame", study: Study, folder: Path, rerun: Rerun | None = None
+    frame: "DataFrame",
+    study: Study,
+    folder: Path,
+    rerun: Rerun | None = None,
+    summary: dict[str, Any] | None = None,
 ) -> list[str]:
     """Write summary.json, summary.md, the pictures and report.html; returns remarks.
 
@@ -30,8 +34,9 @@ def write_study(
     ----------
     frame : one row per run
     rerun : drives the run of a row again, for the trajectories of the worst; None: without them
+    summary : of `study_summary`, where the caller has it
     """
-    summary = study_summary(frame, study)
+    summary = study_summary(frame, study) if summary is None else summary
     write_text(folder / "summary.json", json_text(summary))
     write_text(folder / "summary.md", summary_markdown(summary))
 
