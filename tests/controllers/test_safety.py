@@ -141,7 +141,9 @@ def test_the_shortest_run_and_rest_last_as_long_as_no_limit_is_at_stake() -> Non
     wish = Command(True, 8e3)
     assert LAYER.admissible(wish, resting) == OFF
     assert LAYER.admissible(wish, resting._replace(engine_for_s=3)) == wish
-    assert LAYER.admissible(wish, resting._replace(soc=0.4)) == wish  # it would empty the battery
+    emptied = LAYER.admissible(wish, resting._replace(soc=0.4))
+    assert emptied.engine_on
+    assert 9.4e3 < emptied.p_eng_w < 9.5e3  # demand, auxiliaries and its own cranking
 
 
 def test_an_engine_found_running_at_a_power_that_is_not_known_idles_to_the_end() -> None:
