@@ -1,6 +1,7 @@
 """Grids of the state: the whole admissible box, or a tube around a path."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -76,10 +77,17 @@ class Axis:
 
     def nodes(self, k: int) -> Floats:
         """All nodes at time k, shape (points,)."""
-        number = self.offset[k] + np.arange(self.points)
-        inside = np.where(number > 0, number - 1 + self.phase[k], 0.0)
-        share: Floats = np.where(number > self.cells, float(self.cells), inside)
-        return self.low + self.spacing * share
+        first = int(self.offset[k])
+        nodes: Floats = self.low + self.spacing * (first - 1 + self.phase[k] + self._numbers)
+        if first == 0:
+            nodes[0] = self.low
+        if first + self.points == self.cells + 2:
+            nodes[-1] = self.low + self.spacing * self.cells
+        return nodes
+
+    @cached_property
+    def _numbers(self) -> Floats:
+        return np.arange(float(self.points))
 
     def clearance(self, path: Floats) -> float:
         """Least distance of a path from those edges that are not limits, in half widths."""

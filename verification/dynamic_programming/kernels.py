@@ -505,12 +505,12 @@ class Move(NamedTuple):
     may_end: bool
 
 
-@compiled
-def move_of(step: Step, moves: Moves, e: int) -> Move:
+@inlined
+def move_of(step: Step, moves: Moves, e: int, most_w: float) -> Move:
     """Gather the moves from one engine state; those that are forbidden lead where they would."""
     return Move(
         step.starting if moves.is_start[e] else step.running,
-        moves.most_w[e],
+        most_w,
         moves.on_next[e] >= 0,
         moves.off_next[e] >= 0,
         moves.on_next[e] if moves.on_next[e] >= 0 else moves.rests,
@@ -816,32 +816,42 @@ def finish_rows(
     value: Floats,
 ) -> None:
     """Take landings into W_k, and penalties where nothing else is left; see `bellman_rows`."""
-    states, columns = value.shape[0], value.shape[2]
-    of_state = [move_of(step, moves, e) for e in range(states)]
-    hot_g = [hot_fuels_g(maps, power_w[s, 1 : counts[s]]) for s in range(len(counts))]
-    ramped_g = [hot_fuel_g(maps, moves.most_w[e]) for e in range(states)]
+    rows, columns, kinds = stop - first, value.shape[2], len(counts)
+    factor, losses = np.empty(columns), np.empty(columns)
     for j in range(columns):
-        factor = alpha(constants, t_axis[j])
-        losses = losses_w(constants, t_axis[j], step.speed_mps)
+        factor[j] = alpha(constants, t_axis[j])
+        losses[j] = losses_w(constants, t_axis[j], step.speed_mps)
+    landed_g, landed_w = np.full((kinds, rows, columns), INF), np.zeros((kinds, rows, columns))
+    for s in range(kinds if step.coast_soc < INF else 0):
+        powers = step.starting if s == 1 else step.running
+        _, cranking_w = costs_of_start(constants, s == 1)
         for i in range(first, stop):
-            state = State(soc_axis[i], t_axis[j], battery[i - first], factor, losses)
-            landed_s, landed_g, landed_w = -1, INF, 0.0
-            for e in range(states):
-                if moves.same[e] != e:
-                    continue
-                move, s = of_state[e], 1 if moves.is_start[e] else 0
-                if step.coast_soc < INF and move.may_on and move.may_end:
-                    if s != landed_s:
-                        landed_g, landed_w = landing(maps, constants, step, state, move.powers)
-                        landed_s = s
-                    if landed_w <= move.most_w:
-                        value[e, i, j] = min(value[e, i, j], landed_g)
+            soc, at = soc_axis[i], battery[i - first]
+            least_w = power_to_reach(constants, soc, at, step.demand_w, step.coast_soc)
+            if least_w + cranking_w > powers.high_w:
+                continue
+            for j in range(columns):
+                state = State(soc, t_axis[j], at, factor[j], losses[j])
+                landed_g[s, i - first, j], landed_w[s, i - first, j] = landing(
+                    maps, constants, step, state, powers
+                )
+    hot_g = [hot_fuels_g(maps, power_w[s, 1 : counts[s]]) for s in range(kinds)]
+    for e in range(value.shape[0]):
+        if moves.same[e] != e:
+            continue
+        move, s = move_of(step, moves, e, moves.most_w[e]), 1 if moves.is_start[e] else 0
+        ramped_g, lands = hot_fuel_g(maps, move.most_w), move.may_on and move.may_end
+        for i in range(first, stop):
+            for j in range(columns):
+                if lands and landed_w[s, i - first, j] <= move.most_w:
+                    value[e, i, j] = min(value[e, i, j], landed_g[s, i - first, j])
                 if value[e, i, j] == INF:
+                    state = State(soc_axis[i], t_axis[j], battery[i - first], factor[j], losses[j])
                     value[e, i, j], _, _ = least_penalised(
                         constants, step, state, move, power_w[s, 1 : counts[s]], hot_g[s],
-                        ramped_g[e], following, target,
+                        ramped_g, following, target,
                     )  # fmt: skip
-    for e in range(states):
+    for e in range(value.shape[0]):
         if moves.same[e] != e:
             value[e, first:stop, :] = value[moves.same[e], first:stop, :]
 
@@ -851,7 +861,9 @@ def best_command(
     maps: Maps,
     constants: Constants,
     step: Step,
-    move: Move,
+    moves: Moves,
+    e: int,
+    most_w: float,
     power_w: Floats,
     soc: float,
     t_cl: float,
@@ -862,6 +874,7 @@ def best_command(
 
     Parameters
     ----------
+    e, most_w : engine state, and the greatest power that the ramp allows
     power_w : engine powers from which the search starts, the least and the greatest among them
 
     Returns
@@ -869,6 +882,7 @@ def best_command(
     cost, on or off, power, and whether the command is admissible
     """
     state = state_at(maps, constants, soc, t_cl, step.speed_mps)
+    move = move_of(step, moves, e, most_w)
     start, powers = move.powers.is_start, move.powers
     best, best_on, best_power = INF, False, 0.0
     if step.off_allowed and move.may_off and not step.last:

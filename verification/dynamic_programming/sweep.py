@@ -222,14 +222,14 @@ class _Forward:
             self.soc_costate[k] = self.soc_costate[k - 1] if k > 0 else 0.0
         else:
             step = sweep.step(k)
-            move = kernels.move_of(step, sweep.moves(k), number)
-            most_w = problem.ramped_w(state)
             cost, on, power, admissible = kernels.best_command(
                 problem.maps,
                 problem.constants,
                 step,
-                move._replace(most_w=most_w),
-                sweep.powers_w(k)[1 if move.powers.is_start else 0],
+                sweep.moves(k),
+                number,
+                problem.ramped_w(state),
+                sweep.powers_w(k)[1 if sweep.states.is_start[number] else 0],
                 soc,
                 t_cl,
                 following,
