@@ -1,76 +1,112 @@
 """Grids of the state: the whole admissible box, or a tube around a path."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from qpmpc.verification.dynamic_programming.kernels import Floats, Lattice
+from qpmpc.verification.dynamic_programming.engine_states import EngineStates
+from qpmpc.verification.dynamic_programming.kernels import Floats, Lattice, LatticeAxis
+from qpmpc.verification.dynamic_programming.power_limits import PowerLimits
 from qpmpc.verification.dynamic_programming.problem import Problem
 from qpmpc.verification.dynamic_programming.trajectory import Trajectory
+
+LEAST_CELL = 0.02
+"""Of the two cells at the limits, which a drifting lattice cuts, in whole ones."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """Nodes lowest + spacing * (offset_k + 0 .. points-1) at the times k = 0..n.
+    """Nodes of a lattice that drifts between two fixed limits, at the times k = 0..n.
 
-    All offsets refer to one lattice from the lower to the upper limit, so that the limits are
-    nodes.
+    The nodes at time k are the lower limit, low + spacing (phase_k + 0 .. cells-1), and the upper
+    limit; the phase is the drift in cells without its whole part. A grid holds `points` of them
+    from number offset_k on.
 
     Attributes
     ----------
-    lowest, spacing : the lattice
-    lattice_points : nodes from limit to limit
+    low, spacing, cells : lower limit, width of a whole cell, whole cells from limit to limit
     points : nodes at one time
-    offset : first node at each time, shape (n+1,)
+    phase, offset : shape (n+1,)
     """
 
-    lowest: float
+    low: float
     spacing: float
-    lattice_points: int
+    cells: int
     points: int
+    phase: Floats
     offset: NDArray[np.int64]
 
     @classmethod
-    def full(cls, low: float, high: float, spacing: float, times: int) -> Self:
-        """Cover low..high at all times with cells of at most `spacing`."""
+    def full(cls, low: float, high: float, spacing: float, drift: Floats) -> Self:
+        """Cover low..high at all times with cells of at most `spacing`.
+
+        Parameters
+        ----------
+        drift : distance that the lattice has gone at each time, shape (n+1,)
+        """
         cells = max(2, int(np.ceil((high - low) / spacing - 1e-9)))
-        return cls(low, (high - low) / cells, cells + 1, cells + 1, np.zeros(times, dtype=np.int64))
+        spacing = (high - low) / cells
+        phase = np.clip(drift / spacing % 1.0, LEAST_CELL, 1.0 - LEAST_CELL)
+        return cls(low, spacing, cells, cells + 2, phase, np.zeros(len(drift), dtype=np.int64))
 
     @classmethod
     def around(
-        cls, path: Floats, half_width: float, low: float, high: float, spacing: float
+        cls,
+        path: Floats,
+        half_width: float,
+        low: float,
+        high: float,
+        spacing: float,
+        drift: Floats,
     ) -> Self:
         """Cover the path by at least +-half_width at all times, cut at low and high."""
-        whole = cls.full(low, high, spacing, len(path))
+        whole = cls.full(low, high, spacing, drift)
         points = min(2 * int(np.ceil(half_width / whole.spacing)) + 1, whole.points)
-        centre = np.rint((path - low) / whole.spacing).astype(np.int64)
+        centre = np.rint((path - low) / whole.spacing - whole.phase).astype(np.int64) + 1
         offset = np.clip(centre - points // 2, 0, whole.points - points)
-        return cls(low, whole.spacing, whole.points, points, offset)
+        return cls(low, whole.spacing, whole.cells, points, whole.phase, offset)
 
-    def origin(self, k: int) -> float:
-        """Lowest node at time k."""
-        return self.lowest + self.spacing * float(self.offset[k])
+    def at(self, k: int) -> LatticeAxis:
+        """What compiled code needs of time k."""
+        return LatticeAxis(
+            self.low, self.spacing, self.cells, float(self.phase[k]), int(self.offset[k])
+        )
 
     def nodes(self, k: int) -> Floats:
         """All nodes at time k, shape (points,)."""
-        nodes: Floats = self.lowest + self.spacing * (self.offset[k] + np.arange(self.points))
+        first = int(self.offset[k])
+        nodes: Floats = self.low + self.spacing * (first - 1 + self.phase[k] + self._numbers)
+        if first == 0:
+            nodes[0] = self.low
+        if first + self.points == self.cells + 2:
+            nodes[-1] = self.low + self.spacing * self.cells
         return nodes
+
+    @cached_property
+    def _numbers(self) -> Floats:
+        return np.arange(float(self.points))
 
     def clearance(self, path: Floats) -> float:
         """Least distance of a path from those edges that are not limits, in half widths."""
-        position = (path - self.lowest) / self.spacing - self.offset
+        position = (path - self.low) / self.spacing - self.phase + 1.0 - self.offset
         half = 0.5 * (self.points - 1)
         lower = np.where(self.offset > 0, position, half)
-        top = self.lattice_points - self.points
+        top = self.cells + 2 - self.points
         upper = np.where(self.offset < top, self.points - 1 - position, half)
         return float(min(lower.min(), upper.min()) / half)
 
 
 @dataclass(frozen=True)
 class Grid:
-    """SOC and coolant axes, and the spacing of the engine power."""
+    """SOC and coolant axes, and the spacing of the engine power.
+
+    Both lattices drift as the state does while the engine is off. Its second then leads from
+    node to node, nearly, and interpolation does not spread the value function over the cells: over
+    minutes with the engine off, each of a small part of a cell, that is what spreads it most.
+    """
 
     soc: Axis
     t_cl: Axis
@@ -81,10 +117,13 @@ class Grid:
         cls, problem: Problem, soc_step: float, t_cl_step_k: float, power_step_w: float
     ) -> Self:
         """Cover everything within the limits."""
-        constants, times = problem.constants, problem.steps + 1
+        constants, n = problem.constants, problem.steps
+        soc = np.full(n, problem.soc_init)
+        t_cl = np.full(n, constants.t_cl_min_degc)
+        drift = problem.drift(soc, t_cl)
         return cls(
-            Axis.full(constants.soc_min, constants.soc_max, soc_step, times),
-            Axis.full(constants.t_cl_min_degc, constants.t_cl_max_degc, t_cl_step_k, times),
+            Axis.full(constants.soc_min, constants.soc_max, soc_step, drift[0]),
+            Axis.full(constants.t_cl_min_degc, constants.t_cl_max_degc, t_cl_step_k, drift[1]),
             power_step_w,
         )
 
@@ -99,14 +138,18 @@ class Grid:
     ) -> Self:
         """Cover a tube around a path."""
         constants = problem.constants
+        drift = problem.drift(path.soc[:-1], path.t_cl_degc[:-1])
         return cls(
-            Axis.around(path.soc, half_width[0], constants.soc_min, constants.soc_max, step[0]),
+            Axis.around(
+                path.soc, half_width[0], constants.soc_min, constants.soc_max, step[0], drift[0]
+            ),
             Axis.around(
                 path.t_cl_degc,
                 half_width[1],
                 constants.t_cl_min_degc,
                 constants.t_cl_max_degc,
                 step[1],
+                drift[1],
             ),
             power_step_w,
         )
@@ -122,10 +165,13 @@ class Grid:
         return self.soc.points * self.t_cl.points
 
     def lattice(self, k: int) -> Lattice:
-        """Corner and cell size at time k."""
-        return Lattice(self.soc.origin(k), self.soc.spacing, self.t_cl.origin(k), self.t_cl.spacing)
+        """Both axes at time k, for compiled code."""
+        return Lattice(self.soc.at(k), self.t_cl.at(k))
 
-    def power_count(self, problem: Problem, k: int) -> int:
-        """Number of engine powers tried in step k, both ends of the range included."""
-        span = problem.power_high_w[k] - problem.power_low_w[k]
-        return max(3, int(np.ceil(span / self.power_step_w)) + 1)
+    def powers_w(self, limits: PowerLimits, states: EngineStates, k: int) -> Floats:
+        """Engine powers tried in step k: both ends of the range, and what the ramp leads to."""
+        low_w, high_w = float(limits.low_w[k]), float(limits.high_w[k])
+        count = max(3, int(np.ceil((high_w - low_w) / self.power_step_w)) + 1)
+        even_w: Floats = low_w + np.arange(count) / (count - 1.0) * (high_w - low_w)
+        ramped_w = states.most_w[(states.most_w > low_w) & (states.most_w < high_w)]
+        return np.union1d(even_w, ramped_w) if len(ramped_w) else even_w

@@ -14,6 +14,7 @@ from qpmpc.verification.dynamic_programming.compiled import compiled, inlined
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
 Cells = NDArray[np.uint32]
 Battery = tuple[float, float, float]  # open-circuit voltage, resistances of discharge and charge
 
@@ -24,6 +25,7 @@ MARGIN = 1e-9  # kept from the limits, so that rounding cannot cross them
 ROUNDING = 1e-14  # at SOC_max, where the brakes hold the battery exactly
 LIMIT_FACTOR = 30.0  # see command_cost
 EDGE_FACTOR = 2.0
+DWELL_G = 30.0  # for a shortest run or rest that is broken; see least_penalised
 BISECTIONS = 60
 BLOCK = 16  # rows that share one pass over the tables, to stay in the processor's cache
 REFINEMENTS = 4
@@ -68,21 +70,40 @@ class Constants(NamedTuple):
     t_cl_min_degc: float
     t_cl_max_degc: float
     start_fuel_g: float
+    start_energy_j: float
     soc_worth_g: float
     t_cl_worth_g_per_k: float
+    energy_worth_g_per_j: float
+
+
+class LatticeAxis(NamedTuple):
+    """One axis of a grid at one time; see `grid.Axis`."""
+
+    low: float
+    spacing: float
+    cells: int
+    phase: float
+    offset: int
 
 
 class Lattice(NamedTuple):
-    """Where a grid lies: node (i, j) is at origin + (i, j) * spacing."""
+    """Where a grid lies at one time."""
 
-    soc_origin: float
-    soc_spacing: float
-    t_cl_origin: float
-    t_cl_spacing: float
+    soc: LatticeAxis
+    t_cl: LatticeAxis
+
+
+class Powers(NamedTuple):
+    """Engine powers that a second allows: of an engine that starts in it, or of one that ran."""
+
+    is_start: bool
+    allowed: bool
+    low_w: float
+    high_w: float
 
 
 class Step(NamedTuple):
-    """What one second asks for, which engine powers are allowed, and how many of them to try.
+    """What one second asks for, and which engine powers are allowed.
 
     `coast_*` are the least SOC and T at its end from which the rest is driven with the engine off,
     infinite where there are none.
@@ -90,10 +111,8 @@ class Step(NamedTuple):
 
     demand_w: float
     speed_mps: float
-    power_low_w: float
-    power_high_w: float
-    power_count: int
-    on_allowed: bool
+    running: Powers
+    starting: Powers
     off_allowed: bool
     last: bool
     coast_soc: float
@@ -193,7 +212,8 @@ def next_soc_of(
     """SOC after a step with P_bat = P_d + P_aux - P_eng; the brakes take what it cannot.
 
     Friction brakes take the part of a braking demand that exceeds the charge limit, or would
-    fill the battery beyond SOC_max. `battery` is `battery_at` this SOC.
+    fill the battery beyond SOC_max. `battery` is `battery_at` this SOC. Of a starting engine
+    `power_w` is what is left of its power beside its cranking.
     """
     idle_w = constants.aux_power_w - power_w
     after = soc_after(
@@ -216,7 +236,7 @@ def next_soc(
 def power_to_reach(
     constants: Constants, soc: float, battery: Battery, demand_w: float, soc_end: float
 ) -> float:
-    """Engine power with which the step ends at `soc_end`, the inverse of `soc_after`.
+    """Power beside cranking with which the step ends at `soc_end`, the inverse of `soc_after`.
 
     P_bat = U I - R I^2 with I = (SOC - SOC_end) C_bat.
     """
@@ -266,6 +286,26 @@ def off_step_inverse(
 
 
 @compiled
+def drift(
+    maps: Maps,
+    constants: Constants,
+    demand_w: Floats,
+    speed_mps: Floats,
+    soc: Floats,
+    t_cl: Floats,
+) -> tuple[Floats, Floats]:
+    """Sum of what SOC and T lose or gain in a second off at given states, shapes (n+1,)."""
+    n = len(demand_w)
+    soc_sum, t_cl_sum = np.zeros(n + 1), np.zeros(n + 1)
+    for k in range(n):
+        p, v = demand_w[k], speed_mps[k]
+        soc_sum[k + 1] = soc_sum[k] + next_soc(maps, constants, soc[k], p, 0.0) - soc[k]
+        losses = losses_w(constants, t_cl[k], v)
+        t_cl_sum[k + 1] = t_cl_sum[k] + next_t_cl(constants, t_cl[k], 0.0, 0.0, losses) - t_cl[k]
+    return soc_sum, t_cl_sum
+
+
+@compiled
 def coasting_set(
     maps: Maps,
     constants: Constants,
@@ -304,9 +344,17 @@ def coasting_set(
     return soc, t_cl
 
 
+@inlined
+def costs_of_start(constants: Constants, is_start: bool) -> tuple[float, float]:
+    """Fuel g of a start, and power W that cranks the engine in its second; else zero."""
+    if is_start:
+        return constants.start_fuel_g, constants.start_energy_j
+    return 0.0, 0.0
+
+
 @compiled
 def landing(
-    maps: Maps, constants: Constants, step: Step, state: State, start_g: float
+    maps: Maps, constants: Constants, step: Step, state: State, powers: Powers
 ) -> tuple[float, float]:
     """Return fuel and power of the least costly running engine into the coasting set.
 
@@ -314,17 +362,19 @@ def landing(
     so the least admissible P does it. Infinite fuel if there is none.
     """
     nothing = (INF, 0.0)
-    if not step.on_allowed or step.coast_soc == INF:
+    if not powers.allowed or step.coast_soc == INF:
         return nothing
+    start_g, cranking_w = costs_of_start(constants, powers.is_start)
     power = max(
-        power_to_reach(constants, state.soc, state.battery, step.demand_w, step.coast_soc),
-        step.power_low_w,
+        power_to_reach(constants, state.soc, state.battery, step.demand_w, step.coast_soc)
+        + cranking_w,
+        powers.low_w,
     )
-    if power > step.power_high_w:
+    if power > powers.high_w:
         return nothing
     fuel = state.alpha * hot_fuel_g(maps, power) + start_g
     if next_t_cl(constants, state.t_cl, fuel, power, state.losses_w) < step.coast_t_cl_degc:
-        low, high = power, step.power_high_w
+        low, high = power, powers.high_w
         fuel = state.alpha * hot_fuel_g(maps, high) + start_g
         if next_t_cl(constants, state.t_cl, fuel, high, state.losses_w) < step.coast_t_cl_degc:
             return nothing
@@ -345,7 +395,7 @@ def landing(
         > constants.t_cl_max_degc - MARGIN
     ):
         return nothing
-    after = next_soc_of(constants, state.soc, state.battery, step.demand_w, power)
+    after = next_soc_of(constants, state.soc, state.battery, step.demand_w, power - cranking_w)
     if not step.coast_soc - 0.1 * MARGIN <= after <= constants.soc_max + ROUNDING:
         return nothing
     return fuel, power
@@ -358,6 +408,27 @@ def landing(
 def on_axis(position: float, points: int) -> float:
     """Clamp a position to an axis."""
     return min(max(position, 0.0), points - 1.0)
+
+
+@inlined
+def position_of(axis: LatticeAxis, x: float) -> float:
+    """Position of x in nodes; the cells at the two limits may be narrower than the others."""
+    inside = (x - axis.low) / axis.spacing
+    number = inside - axis.phase + 1.0
+    if number < 1.0:
+        number = inside / axis.phase
+    elif number > axis.cells:
+        number = axis.cells + (number - axis.cells) / (1.0 - axis.phase)
+    return number - axis.offset
+
+
+@inlined
+def node_of(axis: LatticeAxis, index: int) -> float:
+    """Node number `index` of the grid."""
+    number = axis.offset + index
+    if number > axis.cells:
+        return axis.low + axis.spacing * axis.cells
+    return axis.low + axis.spacing * max(number - 1.0 + axis.phase, 0.0) * (number > 0)
 
 
 @inlined
@@ -376,7 +447,7 @@ def outside(position: float, points: int) -> bool:
 
 @inlined
 def interpolate(value: Floats, e: int, row: float, column: float) -> float:
-    """Bilinear interpolation of value[e, i, j] at a position in cells, clamped to the grid."""
+    """Bilinear interpolation of value[e, i, j] at a position in nodes, clamped to the grid."""
     i, a = cell(row, value.shape[1])
     j, b = cell(column, value.shape[2])
     lower = (1.0 - b) * value[e, i, j] + b * value[e, i, j + 1]
@@ -385,23 +456,67 @@ def interpolate(value: Floats, e: int, row: float, column: float) -> float:
 
 
 @compiled
-def gradient(value: Floats, e: int, row: float, column: float) -> tuple[float, float]:
-    """Slopes per cell: differences over +-1 cell, one-sided at the edges."""
-    low, high = max(row - 1.0, 0.0), min(row + 1.0, value.shape[1] - 1.0)
-    rise = interpolate(value, e, high, column) - interpolate(value, e, low, column)
-    left, right = max(column - 1.0, 0.0), min(column + 1.0, value.shape[2] - 1.0)
-    run = interpolate(value, e, row, right) - interpolate(value, e, row, left)
+def gradient(
+    value: Floats, e: int, lattice: Lattice, soc: float, t_cl: float
+) -> tuple[float, float]:
+    """Slopes over SOC and T: differences over +-1 whole cell, one-sided at the edges."""
+    rows, columns = value.shape[1], value.shape[2]
+    row, column = position_of(lattice.soc, soc), position_of(lattice.t_cl, t_cl)
+    low = max(soc - lattice.soc.spacing, node_of(lattice.soc, 0))
+    high = min(soc + lattice.soc.spacing, node_of(lattice.soc, rows - 1))
+    rise = interpolate(value, e, position_of(lattice.soc, high), column) - interpolate(
+        value, e, position_of(lattice.soc, low), column
+    )
+    left = max(t_cl - lattice.t_cl.spacing, node_of(lattice.t_cl, 0))
+    right = min(t_cl + lattice.t_cl.spacing, node_of(lattice.t_cl, columns - 1))
+    run = interpolate(value, e, row, position_of(lattice.t_cl, right)) - interpolate(
+        value, e, row, position_of(lattice.t_cl, left)
+    )
     return rise / (high - low), run / (right - left)
 
 
 # the Bellman step
 
 
+class Moves(NamedTuple):
+    """Where a second on or off leads each engine state, as in `engine_states.EngineStates`.
+
+    `same` is a state with the same value function, itself for those that are computed.
+    """
+
+    rests: int
+    is_start: Bools
+    on_next: Ints
+    off_next: Ints
+    most_w: Floats
+    may_end: Bools
+    same: Ints
+
+
+class Move(NamedTuple):
+    """`Moves` of one engine state, and the engine powers of a second on."""
+
+    powers: Powers
+    most_w: float
+    may_on: bool
+    may_off: bool
+    on_next: int
+    off_next: int
+    may_end: bool
+
+
 @inlined
-def grid_power_w(step: Step, u: int) -> float:
-    """Engine power number u = 0..power_count-1 over the allowed range."""
-    share = u / (step.power_count - 1.0)
-    return step.power_low_w + share * (step.power_high_w - step.power_low_w)
+def move_of(step: Step, moves: Moves, e: int, most_w: float) -> Move:
+    """Gather the moves from one engine state; those that are forbidden lead where they would."""
+    return Move(
+        step.starting if moves.is_start[e] else step.running,
+        most_w,
+        moves.on_next[e] >= 0,
+        moves.off_next[e] >= 0,
+        moves.on_next[e] if moves.on_next[e] >= 0 else moves.rests,
+        max(moves.off_next[e], 0),
+        moves.may_end[e] or step.last,
+    )
 
 
 @inlined
@@ -417,11 +532,11 @@ def state_at(maps: Maps, constants: Constants, soc: float, t_cl: float, speed_mp
 
 
 @compiled
-def grid_hot_fuel_g(maps: Maps, step: Step) -> Floats:
-    """`hot_fuel_g` of all `grid_power_w`."""
-    hot_g = np.empty(step.power_count)
-    for u in range(step.power_count):
-        hot_g[u] = hot_fuel_g(maps, grid_power_w(step, u))
+def hot_fuels_g(maps: Maps, power_w: Floats) -> Floats:
+    """`hot_fuel_g` of many powers."""
+    hot_g = np.empty(len(power_w))
+    for u in range(len(power_w)):
+        hot_g[u] = hot_fuel_g(maps, power_w[u])
     return hot_g
 
 
@@ -430,11 +545,12 @@ def command_cost(
     constants: Constants,
     step: Step,
     state: State,
-    start_g: float,
+    is_start: bool,
     on: bool,
     power: float,
     hot_g: float,
     following: Floats,
+    after: int,
     target: Lattice,
     strict: bool,
 ) -> float:
@@ -444,12 +560,12 @@ def command_cost(
     LIMIT_FACTOR times the fuel that would make up for it, and each unit beyond the grid
     EDGE_FACTOR times. More charge than the grid holds is given away: charge never harms.
     """
-    states, rows, columns = following.shape
+    rows, columns = following.shape[1], following.shape[2]
+    start_g, cranking_w = costs_of_start(constants, is_start and on)
     fuel = state.alpha * hot_g + start_g if on else 0.0
     t_end = next_t_cl(constants, state.t_cl, fuel, power, state.losses_w)
-    soc_end = next_soc_of(constants, state.soc, state.battery, step.demand_w, power)
-    row = (soc_end - target.soc_origin) / target.soc_spacing
-    column = (t_end - target.t_cl_origin) / target.t_cl_spacing
+    soc_end = next_soc_of(constants, state.soc, state.battery, step.demand_w, power - cranking_w)
+    row, column = position_of(target.soc, soc_end), position_of(target.t_cl, t_end)
     if strict:
         if (
             outside(row, rows)
@@ -463,13 +579,13 @@ def command_cost(
         least_soc = max(step.coast_soc, constants.soc_min) if step.last else constants.soc_min
         soc_excess = max(least_soc - soc_end, soc_end - constants.soc_max, 0.0)
         t_excess = max(constants.t_cl_min_degc - t_end, t_end - constants.t_cl_max_degc, 0.0)
-        t_beyond = abs(t_end - target.t_cl_origin - on_axis(column, columns) * target.t_cl_spacing)
-        soc_below = max(target.soc_origin - soc_end, 0.0)
+        t_below = node_of(target.t_cl, 0) - t_end
+        t_beyond = max(t_below, t_end - node_of(target.t_cl, columns - 1), 0.0)
+        soc_below = max(node_of(target.soc, 0) - soc_end, 0.0)
         penalty = constants.soc_worth_g * (LIMIT_FACTOR * soc_excess + EDGE_FACTOR * soc_below)
         penalty += constants.t_cl_worth_g_per_k * (LIMIT_FACTOR * t_excess + EDGE_FACTOR * t_beyond)
     if step.last:
         return fuel + penalty
-    after = 1 if on and states == 2 else 0
     return fuel + penalty + interpolate(following, after, row, column)
 
 
@@ -478,28 +594,51 @@ def least_penalised(
     constants: Constants,
     step: Step,
     state: State,
-    start_g: float,
+    move: Move,
+    power_w: Floats,
     hot_g: Floats,
+    ramped_hot_g: float,
     following: Floats,
     target: Lattice,
 ) -> tuple[float, bool, float]:
-    """Return cost, on or off, and power of the command that leaves the grid by the least.
+    """Return cost, on or off, and power of the command that breaks limits or grid by the least.
 
-    `hot_g` is `grid_hot_fuel_g`.
+    A shortest run or rest that is broken costs DWELL_G; power that the ramp does not allow, and
+    neither can the battery give, LIMIT_FACTOR times its fuel.
+
+    Parameters
+    ----------
+    power_w, hot_g : engine powers to be tried, and their `hot_fuel_g`
+    ramped_hot_g : that of the greatest power that the ramp allows
     """
     best, best_on, best_power = INF, False, 0.0
+    start = move.powers.is_start
     if step.off_allowed:
         best = command_cost(
-            constants, step, state, start_g, False, 0.0, 0.0, following, target, False
+            constants, step, state, start, False, 0.0, 0.0, following, move.off_next, target, False
         )
-    if step.on_allowed:
-        for u in range(step.power_count):
-            power = grid_power_w(step, u)
-            cost = command_cost(
-                constants, step, state, start_g, True, power, hot_g[u], following, target, False
-            )
+        best += 0.0 if move.may_off else DWELL_G
+    if move.powers.allowed:
+        broken_g = 0.0 if move.may_on else DWELL_G
+        for u in range(len(power_w)):
+            power = power_w[u]
+            if power > move.most_w:
+                break
+            cost = broken_g + command_cost(
+                constants, step, state, start, True, power, hot_g[u],
+                following, move.on_next, target, False,
+            )  # fmt: skip
             if cost < best:
                 best, best_on, best_power = cost, True, power
+        missing_w = move.powers.low_w - move.most_w
+        if missing_w > 0.0:
+            cost = command_cost(
+                constants, step, state, start, True, move.most_w, ramped_hot_g,
+                following, move.on_next, target, False,
+            )  # fmt: skip
+            cost += broken_g + LIMIT_FACTOR * constants.energy_worth_g_per_j * missing_w
+            if cost < best:
+                best, best_on, best_power = cost, True, move.most_w
     return best, best_on, best_power
 
 
@@ -507,86 +646,89 @@ def least_penalised(
 def temperature_tables(
     maps: Maps,
     constants: Constants,
-    step: Step,
+    speed_mps: float,
+    power_w: Floats,
+    counts: Ints,
     t_axis: Floats,
-    target: Lattice,
-    columns: int,
+    target: LatticeAxis,
     fuel: Floats,
     column: Cells,
     weight: Floats,
     run_end: Cells,
 ) -> None:
-    """Fill fuel and next T, as cell and weight, for all engine states e, inputs u, temperatures j.
+    """Fill fuel and next T, as cell and weight, for all inputs u and temperatures j.
 
-    Input u = 0 is off, u >= 1 power u - 1 of `grid_power_w`. Shapes (2 or 1, count+1, nt); fuel
-    is infinite where the next T leaves the grid of `columns` nodes. Two engine states exist only
-    with a start cost: e = 0, off before, and e = 1, on before. From each j on, the cells up to
+    First index s: 0 for an engine that ran, 1 for one that starts. Input u = 0 is off, u >= 1 on
+    with power_w[s, u], up to counts[s]. Shapes (1 or 2, inputs, nt); fuel
+    is infinite where the next T leaves the grid. From each j on, the cells up to
     `run_end` follow one another, and all are on the grid or all off it.
     """
-    states, nt = fuel.shape[0], len(t_axis)
+    nt = len(t_axis)
     factor, losses = np.empty(nt), np.empty(nt)
     for j in range(nt):
         factor[j] = alpha(constants, t_axis[j])
-        losses[j] = losses_w(constants, t_axis[j], step.speed_mps)
-    for u in range(step.power_count + 1):
-        power = grid_power_w(step, u - 1) if u > 0 else 0.0
-        hot = hot_fuel_g(maps, power) if u > 0 else 0.0
-        for e in range(states):
-            start_g = constants.start_fuel_g if u > 0 and states == 2 and e == 0 else 0.0
+        losses[j] = losses_w(constants, t_axis[j], speed_mps)
+    for s in range(len(counts)):
+        for u in range(s, counts[s]):
+            power = power_w[s, u]
+            hot = hot_fuel_g(maps, power) if u > 0 else 0.0
+            start_g, _ = costs_of_start(constants, s == 1)
             for j in range(nt):
                 used = factor[j] * hot + start_g
                 end = next_t_cl(constants, t_axis[j], used, power, losses[j])
-                position = (end - target.t_cl_origin) / target.t_cl_spacing
-                fuel[e, u, j] = INF if outside(position, columns) else used
-                column[e, u, j], weight[e, u, j] = cell(position, columns)
-            run_end[e, u, nt - 1] = nt
+                position = position_of(target, end)
+                fuel[s, u, j] = INF if outside(position, nt) else used
+                column[s, u, j], weight[s, u, j] = cell(position, nt)
+            run_end[s, u, nt - 1] = nt
             for j in range(nt - 2, -1, -1):
-                follows = column[e, u, j + 1] == column[e, u, j] + 1
-                same = (fuel[e, u, j] == INF) == (fuel[e, u, j + 1] == INF)
-                run_end[e, u, j] = run_end[e, u, j + 1] if follows and same else j + 1
+                follows = column[s, u, j + 1] == column[s, u, j] + 1
+                same = (fuel[s, u, j] == INF) == (fuel[s, u, j + 1] == INF)
+                run_end[s, u, j] = run_end[s, u, j + 1] if follows and same else j + 1
 
 
 @compiled
 def improve(
     value: Floats,
+    e: int,
     fuel: Floats,
     column: Cells,
     weight: Floats,
     run_end: Cells,
     following: Floats,
+    after: int,
     begin: int,
-    lower: NDArray[np.int64],
+    lower: Ints,
     share: Floats,
+    s: int,
     u: int,
 ) -> None:
-    """Take the minimum with input u: value_ij = min(value_ij, fuel_j + row_i at c_j + w_j).
+    """Take the minimum with an input: value_ij = min(value_ij, fuel_j + row_i at c_j + w_j).
 
+    Of engine state e, with input u of `temperature_tables` s, which leads to engine state `after`;
     row_i = (1 - s_i) W_{k+1} at lower_i + s_i W_{k+1} at lower_i + 1, for i = begin.. as far as
     `lower` goes; a negative lower_i leaves the row out. Run by run, where row_i is read in order:
     several nodes then take one instruction. Unsigned indices, as negative ones need a look.
     """
-    after = np.uint64(1 if u > 0 and following.shape[0] == 2 else 0)
-    v, nodes = np.uint64(u), np.uint64(value.shape[2])
+    a, d, v, w = np.uint64(e), np.uint64(after), np.uint64(u), np.uint64(s)
+    nodes = np.uint64(value.shape[2])
     for row in range(len(lower)):
         if lower[row] < 0:
             continue
         i, low, part = np.uint64(begin + row), np.uint64(lower[row]), share[row]
         high, rest = low + ONE, 1.0 - part
-        for state in range(value.shape[0]):
-            e = np.uint64(state)
-            start = np.uint64(0)
-            while start < nodes:
-                stop = np.uint64(run_end[e, v, start])
-                if fuel[e, v, start] < INF:
-                    first = np.uint64(column[e, v, start])
-                    for n in range(stop - start):
-                        j, c = start + n, first + n
-                        left = rest * following[after, low, c] + part * following[after, high, c]
-                        c += ONE
-                        right = rest * following[after, low, c] + part * following[after, high, c]
-                        cost = fuel[e, v, j] + left + weight[e, v, j] * (right - left)
-                        value[e, i, j] = cost if cost < value[e, i, j] else value[e, i, j]
-                start = stop
+        start = np.uint64(0)
+        while start < nodes:
+            stop = np.uint64(run_end[w, v, start])
+            if fuel[w, v, start] < INF:
+                first = np.uint64(column[w, v, start])
+                for n in range(stop - start):
+                    j, c = start + n, first + n
+                    left = rest * following[d, low, c] + part * following[d, high, c]
+                    c += ONE
+                    right = rest * following[d, low, c] + part * following[d, high, c]
+                    cost = fuel[w, v, j] + left + weight[w, v, j] * (right - left)
+                    value[a, i, j] = cost if cost < value[a, i, j] else value[a, i, j]
+            start = stop
 
 
 @compiled
@@ -596,6 +738,9 @@ def bellman_rows(
     maps: Maps,
     constants: Constants,
     step: Step,
+    moves: Moves,
+    power_w: Floats,
+    counts: Ints,
     soc_axis: Floats,
     t_axis: Floats,
     target: Lattice,
@@ -608,49 +753,107 @@ def bellman_rows(
 ) -> None:
     """One Bellman step for rows first..stop-1 of the SOC axis.
 
-    W_k(x, e) = min{ W_{k+1}(x'_off, 0),
-                     min_P alpha f(P) + start + W_{k+1}(x'_P, 1),
+    W_k(x, e) = min{ W_{k+1}(x'_off, e'_off),
+                     min_P alpha f(P) + start + W_{k+1}(x'_P, e'_on),
                      min_P alpha f(P) + start   over x'_P in the coasting set of k+1 }
 
-    over inputs that keep x' on the grid of k+1; where none does, the least penalised one.
-    `following` and `value` are W_{k+1} and W_k, shape (2 or 1, ns, nt).
+    over inputs that keep x' on the grid of k+1, and that engine state e allows; where none does,
+    the least penalised one. `following` and `value` are W_{k+1} and W_k, shape (states, ns, nt);
+    the other arrays as in `temperature_tables`.
     """
-    states, rows, columns = following.shape
+    states, rows = following.shape[0], following.shape[1]
     battery = [battery_at(maps, soc_axis[i]) for i in range(first, stop)]
     lower, share = np.empty(BLOCK, dtype=np.int64), np.empty(BLOCK)
     for begin in range(first, stop, BLOCK):
         end = min(begin + BLOCK, stop)
+        count = end - begin
         value[:, begin:end, :] = INF
-        for u in range(0 if step.last else step.power_count + 1):
-            if not (step.on_allowed if u > 0 else step.off_allowed):
-                continue
-            power = grid_power_w(step, u - 1) if u > 0 else 0.0
-            for i in range(begin, end):
-                soc = next_soc_of(constants, soc_axis[i], battery[i - first], step.demand_w, power)
-                position = (soc - target.soc_origin) / target.soc_spacing
-                lower[i - begin], share[i - begin] = cell(position, rows)
-                if outside(position, rows):
-                    lower[i - begin] = -1
-            count = end - begin
-            improve(
-                value, fuel, column, weight, run_end, following,
-                begin, lower[:count], share[:count], u,
-            )  # fmt: skip
-    hot_g = grid_hot_fuel_g(maps, step)
+        for s in range(0 if step.last else len(counts)):
+            _, cranking_w = costs_of_start(constants, s == 1)
+            for u in range(s, counts[s]):
+                if not (step.off_allowed if u == 0 else (step.running, step.starting)[s].allowed):
+                    continue
+                power = power_w[s, u]
+                for i in range(begin, end):
+                    soc = next_soc_of(
+                        constants, soc_axis[i], battery[i - first], step.demand_w,
+                        power - cranking_w,
+                    )  # fmt: skip
+                    position = position_of(target.soc, soc)
+                    lower[i - begin], share[i - begin] = cell(position, rows)
+                    if outside(position, rows):
+                        lower[i - begin] = -1
+                for e in range(states):
+                    other = u > 0 and moves.is_start[e] != (s == 1)
+                    after = moves.on_next[e] if u > 0 else moves.off_next[e]
+                    if other or after < 0 or power > moves.most_w[e] or moves.same[e] != e:
+                        continue
+                    improve(
+                        value, e, fuel, column, weight, run_end, following, after,
+                        begin, lower[:count], share[:count], s, u,
+                    )  # fmt: skip
+    finish_rows(
+        first, stop, maps, constants, step, moves, power_w, counts, soc_axis, t_axis, target,
+        battery, following, value,
+    )  # fmt: skip
+
+
+@compiled
+def finish_rows(
+    first: int,
+    stop: int,
+    maps: Maps,
+    constants: Constants,
+    step: Step,
+    moves: Moves,
+    power_w: Floats,
+    counts: Ints,
+    soc_axis: Floats,
+    t_axis: Floats,
+    target: Lattice,
+    battery: list[Battery],
+    following: Floats,
+    value: Floats,
+) -> None:
+    """Take landings into W_k, and penalties where nothing else is left; see `bellman_rows`."""
+    rows, columns, kinds = stop - first, value.shape[2], len(counts)
+    factor, losses = np.empty(columns), np.empty(columns)
     for j in range(columns):
-        factor = alpha(constants, t_axis[j])
-        losses = losses_w(constants, t_axis[j], step.speed_mps)
+        factor[j] = alpha(constants, t_axis[j])
+        losses[j] = losses_w(constants, t_axis[j], step.speed_mps)
+    landed_g, landed_w = np.full((kinds, rows, columns), INF), np.zeros((kinds, rows, columns))
+    for s in range(kinds if step.coast_soc < INF else 0):
+        powers = step.starting if s == 1 else step.running
+        _, cranking_w = costs_of_start(constants, s == 1)
         for i in range(first, stop):
-            state = State(soc_axis[i], t_axis[j], battery[i - first], factor, losses)
-            for e in range(states):
-                start_g = constants.start_fuel_g if states == 2 and e == 0 else 0.0
-                if step.coast_soc < INF:
-                    cost, _ = landing(maps, constants, step, state, start_g)
-                    value[e, i, j] = min(value[e, i, j], cost)
+            soc, at = soc_axis[i], battery[i - first]
+            least_w = power_to_reach(constants, soc, at, step.demand_w, step.coast_soc)
+            if least_w + cranking_w > powers.high_w:
+                continue
+            for j in range(columns):
+                state = State(soc, t_axis[j], at, factor[j], losses[j])
+                landed_g[s, i - first, j], landed_w[s, i - first, j] = landing(
+                    maps, constants, step, state, powers
+                )
+    hot_g = [hot_fuels_g(maps, power_w[s, 1 : counts[s]]) for s in range(kinds)]
+    for e in range(value.shape[0]):
+        if moves.same[e] != e:
+            continue
+        move, s = move_of(step, moves, e, moves.most_w[e]), 1 if moves.is_start[e] else 0
+        ramped_g, lands = hot_fuel_g(maps, move.most_w), move.may_on and move.may_end
+        for i in range(first, stop):
+            for j in range(columns):
+                if lands and landed_w[s, i - first, j] <= move.most_w:
+                    value[e, i, j] = min(value[e, i, j], landed_g[s, i - first, j])
                 if value[e, i, j] == INF:
+                    state = State(soc_axis[i], t_axis[j], battery[i - first], factor[j], losses[j])
                     value[e, i, j], _, _ = least_penalised(
-                        constants, step, state, start_g, hot_g, following, target
-                    )
+                        constants, step, state, move, power_w[s, 1 : counts[s]], hot_g[s],
+                        ramped_g, following, target,
+                    )  # fmt: skip
+    for e in range(value.shape[0]):
+        if moves.same[e] != e:
+            value[e, first:stop, :] = value[moves.same[e], first:stop, :]
 
 
 @compiled
@@ -658,49 +861,64 @@ def best_command(
     maps: Maps,
     constants: Constants,
     step: Step,
+    moves: Moves,
+    e: int,
+    most_w: float,
+    power_w: Floats,
     soc: float,
     t_cl: float,
-    engine_on: bool,
     following: Floats,
     target: Lattice,
 ) -> tuple[float, bool, float, bool]:
     """Minimise the right-hand side of the Bellman step at any state, over continuous power.
 
+    Parameters
+    ----------
+    e, most_w : engine state, and the greatest power that the ramp allows
+    power_w : engine powers from which the search starts, the least and the greatest among them
+
     Returns
     -------
     cost, on or off, power, and whether the command is admissible
     """
-    start_g = 0.0 if engine_on else constants.start_fuel_g
     state = state_at(maps, constants, soc, t_cl, step.speed_mps)
+    move = move_of(step, moves, e, most_w)
+    start, powers = move.powers.is_start, move.powers
     best, best_on, best_power = INF, False, 0.0
-    if step.off_allowed and not step.last:
+    if step.off_allowed and move.may_off and not step.last:
         best = command_cost(
-            constants, step, state, start_g, False, 0.0, 0.0, following, target, True
+            constants, step, state, start, False, 0.0, 0.0, following, move.off_next, target, True
         )
-    if step.on_allowed and not step.last:
-        spacing = (step.power_high_w - step.power_low_w) / (step.power_count - 1.0)
-        on_best, centre, points = INF, step.power_low_w, step.power_count - 1
+    low_w, high_w = powers.low_w, min(powers.high_w, move.most_w)
+    if powers.allowed and move.may_on and low_w <= high_w and not step.last:
+        points = len(power_w) - 1
+        spacing = (high_w - low_w) / points
+        on_best, centre = INF, low_w
         for _ in range(REFINEMENTS + 1):
             around = centre
             for u in range(-points, points + 1):
-                power = min(max(around + u * spacing, step.power_low_w), step.power_high_w)
+                power = min(max(around + u * spacing, low_w), high_w)
                 hot = hot_fuel_g(maps, power)
                 cost = command_cost(
-                    constants, step, state, start_g, True, power, hot, following, target, True
-                )
+                    constants, step, state, start, True, power, hot,
+                    following, move.on_next, target, True,
+                )  # fmt: skip
                 if cost < on_best:
                     on_best, centre = cost, power
             points = REFINEMENT_POINTS
             spacing /= points
         if on_best < best:
             best, best_on, best_power = on_best, True, centre
-    cost, power = landing(maps, constants, step, state, start_g)
-    if cost < best:
-        best, best_on, best_power = cost, True, power
+    if move.may_on and move.may_end:
+        limited = Powers(start, powers.allowed, low_w, high_w)
+        cost, power = landing(maps, constants, step, state, limited)
+        if cost < best:
+            best, best_on, best_power = cost, True, power
     if best < INF:
         return best, best_on, best_power, True
-    hot_g = grid_hot_fuel_g(maps, step)
+    hot_g = hot_fuels_g(maps, power_w)
     best, best_on, best_power = least_penalised(
-        constants, step, state, start_g, hot_g, following, target
-    )
+        constants, step, state, move, power_w, hot_g, hot_fuel_g(maps, move.most_w),
+        following, target,
+    )  # fmt: skip
     return best, best_on, best_power, False

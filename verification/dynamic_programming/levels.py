@@ -27,11 +27,11 @@ def solve(
 ) -> DpSolution:
     """Solve all levels; see `solve_dp` of this package."""
     problem = build_problem(cycle, vehicle)
-    soc_step, t_cl_step_k, power, refinement = settings.cells
-    step = (soc_step, t_cl_step_k)
-    coarse = Grid.full(problem, *step, power)
-    width = (settings.tube_soc, settings.tube_t_cl_k)
-    fine = (step[0] / refinement, step[1] / refinement)
+    soc_step, t_cl_step_k, power, _ = settings.cells
+    coarse = Grid.full(problem, soc_step, t_cl_step_k, power)
+    *half_width, refinement = settings.tube(cycle.duration_s)
+    width = (half_width[0], half_width[1])
+    fine = (soc_step / refinement, t_cl_step_k / refinement)
     levels = []
 
     def run(grid: Grid, begin: float, end: float) -> Trajectory:

@@ -6,8 +6,16 @@ import numpy as np
 
 from qpmpc.cycles import Cycle
 from qpmpc.errors import InputError
-from qpmpc.vehicle import Plant, Vehicle, demand_w
-from qpmpc.verification.dynamic_programming.kernels import Bools, Constants, Floats, Maps
+from qpmpc.vehicle import Plant, PlantState, Vehicle, demand_w
+from qpmpc.verification.dynamic_programming.engine_states import STEP_S, EngineStates
+from qpmpc.verification.dynamic_programming.kernels import (
+    Bools,
+    Constants,
+    Floats,
+    Maps,
+    drift,
+)
+from qpmpc.verification.dynamic_programming.power_limits import PowerLimits, power_limits
 
 
 @dataclass(frozen=True)
@@ -18,20 +26,21 @@ class Problem:
     ----------
     plant : the plant on which the result is realised
     maps, constants : its numbers for compiled code
+    states : of the engine
     demand_w, speed_mps : shape (n,)
-    power_low_w, power_high_w : engine power with the engine on, shape (n,)
-    on_allowed, off_allowed : shape (n,)
+    running, starting : power of an engine that ran before, and of one that starts
+    off_allowed : shape (n,)
     soc_init, t_cl_init_degc : start; soc_init is also the least final SOC
     """
 
     plant: Plant
     maps: Maps
     constants: Constants
+    states: EngineStates
     demand_w: Floats
     speed_mps: Floats
-    power_low_w: Floats
-    power_high_w: Floats
-    on_allowed: Bools
+    running: PowerLimits
+    starting: PowerLimits
     off_allowed: Bools
     soc_init: float
     t_cl_init_degc: float
@@ -41,17 +50,23 @@ class Problem:
         """Number n of steps of 1 s."""
         return len(self.demand_w)
 
+    def ramped_w(self, state: PlantState) -> float:
+        """Greatest engine power that the ramp allows in the second after this state."""
+        before_w = state.p_eng_w if state.engine_on else 0.0
+        return before_w + self.plant.vehicle.engine.ramp_w_per_s * STEP_S
+
+    def drift(self, soc: Floats, t_cl_degc: Floats) -> tuple[Floats, Floats]:
+        """Sum of the changes of SOC and T in the seconds before, had the engine been off in each.
+
+        Parameters
+        ----------
+        soc, t_cl_degc : states in which each second begins, shape (n,)
+        """
+        return drift(self.maps, self.constants, self.demand_w, self.speed_mps, soc, t_cl_degc)
+
 
 def build_problem(cycle: Cycle, vehicle: Vehicle) -> Problem:
     """Tabulate plant, demand and power limits.
-
-    With the engine on its power keeps the battery within its limits,
-
-        P_d + P_aux - P_dis_max <= P_eng <= max(P_d, 0) + P_aux + P_chg_max,
-
-    as far as its own limits allow; braking beyond the charge limit goes to the friction brakes.
-    With the engine off, P_d + P_aux <= P_dis_max. Where even full engine power is not enough, the
-    engine runs at full power and the excess is counted as a violation.
 
     Raises
     ------
@@ -72,15 +87,8 @@ def build_problem(cycle: Cycle, vehicle: Vehicle) -> Problem:
             f"{thermal.t_cl_max_degc:g} (given: {trip.t_cl_init_degc:g})"
         )
     demand = demand_w(cycle, vehicle.chassis)
-    net = demand + battery.aux_power_w
-    low = np.maximum(engine.power_min_w, net - battery.power_discharge_max_w)
-    high = np.minimum(
-        engine.power_max_w,
-        np.maximum(demand, 0.0) + battery.aux_power_w + battery.power_charge_max_w,
-    )
-    low = np.minimum(low, engine.power_max_w)
-    on_allowed = low <= high
-    off_allowed = net <= battery.power_discharge_max_w
+    running, starting, off_allowed = power_limits(vehicle, demand)
+    greatest_w = float(max(running.high_w.max(), starting.high_w.max()))
     lhv_j_per_g = engine.lhv_j_per_g
     fuel_per_soc = plant.battery.energy_j(trip.soc_init) / (trip.eta_eq * lhv_j_per_g)
     maps = Maps(
@@ -104,19 +112,21 @@ def build_problem(cycle: Cycle, vehicle: Vehicle) -> Problem:
         soc_min=battery.soc_min,
         soc_max=battery.soc_max,
         start_fuel_g=engine.start_fuel_g,
+        start_energy_j=engine.start_energy_j,
         soc_worth_g=fuel_per_soc,
         t_cl_worth_g_per_k=thermal.heat_capacity_j_per_k / lhv_j_per_g,
+        energy_worth_g_per_j=1.0 / (trip.eta_eq * lhv_j_per_g),
     )
     return Problem(
         plant=plant,
         maps=maps,
         constants=constants,
+        states=EngineStates.of(engine, greatest_w, len(demand)),
         demand_w=demand,
         speed_mps=cycle.step_speed_mps,
-        power_low_w=low,
-        power_high_w=high,
-        on_allowed=on_allowed,
-        off_allowed=off_allowed | ~on_allowed,
+        running=running,
+        starting=starting,
+        off_allowed=off_allowed,
         soc_init=trip.soc_init,
         t_cl_init_degc=trip.t_cl_init_degc,
     )

@@ -21,6 +21,17 @@ class Cells(NamedTuple):
     refinement: int
 
 
+class Tube(NamedTuple):
+    """Half widths in SOC and T, and fine cells in one coarse, along each axis."""
+
+    soc: float
+    t_cl_k: float
+    refinement: int
+
+
+SHORT_S = 300.0
+"""On shorter trips a cell of the quick grid would be too large a part of what is burnt."""
+
 GRIDS = {"reference": Cells(0.002, 0.5, 500.0, 8), "quick": Cells(0.004, 1.0, 1000.0, 4)}
 
 
@@ -38,7 +49,8 @@ class DpSettings(BaseModel):
     power_step_w : spacing of the engine power in the backward pass; the forward pass refines it
     refinement : cells of the tube in one coarse cell, along each axis. Each of these four, if
         given, takes the place of the reference's; `quick` comes with its own and allows none
-    tube_soc, tube_t_cl_k : half widths of the tube at first, 1 and K
+    tube_soc, tube_t_cl_k : half widths of the tube at first, 1 and K; on trips of less than 300 s
+        `quick` takes half of them, and halves the tube's cells
     threads : processor cores to use; if None those of `threads.default_threads`; does not change
         the result
     """
@@ -77,6 +89,13 @@ class DpSettings(BaseModel):
     def cells(self) -> Cells:
         """Spacings of the named grid, each replaced by the one that is given."""
         return Cells(**(GRIDS[self.grid]._asdict() | self._given()))
+
+    def tube(self, duration_s: float) -> Tube:
+        """Return the first tube of a trip of that duration."""
+        tube = Tube(self.tube_soc, self.tube_t_cl_k, self.cells.refinement)
+        if self.grid != "quick" or duration_s >= SHORT_S:
+            return tube
+        return Tube(0.5 * tube.soc, 0.5 * tube.t_cl_k, 2 * tube.refinement)
 
     @classmethod
     def quick(cls) -> "DpSettings":

@@ -10,7 +10,15 @@ import numpy as np
 from qpmpc.vehicle import Command, PlantState
 from qpmpc.verification.dynamic_programming import kernels
 from qpmpc.verification.dynamic_programming.grid import Grid
-from qpmpc.verification.dynamic_programming.kernels import Cells, Floats, Step
+from qpmpc.verification.dynamic_programming.kernels import (
+    Cells,
+    Floats,
+    Ints,
+    Moves,
+    Powers,
+    Step,
+)
+from qpmpc.verification.dynamic_programming.power_limits import PowerLimits
 from qpmpc.verification.dynamic_programming.problem import Problem
 from qpmpc.verification.dynamic_programming.trajectory import Trajectory
 
@@ -32,8 +40,9 @@ class Sweep:
     def __init__(self, problem: Problem, grid: Grid, threads: int) -> None:
         self.problem = problem
         self.grid = grid
-        self.states = 2 if problem.constants.start_fuel_g > 0.0 else 1
-        self.segment = segment_length(problem.steps, 8 * self.states * grid.nodes)
+        self.states = problem.states
+        self.segment = segment_length(problem.steps, 8 * self.states.count * grid.nodes)
+        self.same = self._same()
         rows = grid.soc.points
         parts = threads if grid.nodes >= NODES_WORTH_THREADS else 1
         bounds = np.linspace(0, rows, parts + 1).astype(int).tolist()
@@ -50,7 +59,7 @@ class Sweep:
     def run(self, progress: Progress) -> Trajectory:
         """Solve and roll out; `progress` receives the finished fraction."""
         n, segment = self.problem.steps, self.segment
-        shape = (self.states, *self.grid.shape)
+        shape = (self.states.count, *self.grid.shape)
         total, done = 2 * n - len(range(0, n, segment)), 0
         with ThreadPoolExecutor(len(self.chunks)) as pool:
             value = np.zeros(shape)
@@ -81,15 +90,41 @@ class Sweep:
         return Step(
             float(problem.demand_w[k]),
             float(problem.speed_mps[k]),
-            float(problem.power_low_w[k]),
-            float(problem.power_high_w[k]),
-            self.grid.power_count(problem, k),
-            bool(problem.on_allowed[k]),
+            _powers(False, problem.running, k),
+            _powers(True, problem.starting, k),
             bool(problem.off_allowed[k]),
             k == problem.steps - 1,
             float(soc[k + 1]),
             float(t_cl[k + 1]),
         )
+
+    def moves(self, k: int) -> Moves:
+        """Gather where step k leads the engine."""
+        states = self.states
+        return Moves(
+            states.rests,
+            states.is_start,
+            states.on_next,
+            states.off_next,
+            states.most_w,
+            states.may_end,
+            self.same[k],
+        )
+
+    def powers_w(self, k: int) -> list[Floats]:
+        """Engine powers tried in step k: of an engine that ran, and of one that starts."""
+        problem = self.problem
+        limits = (problem.running, problem.starting)[: min(self.states.count, 2)]
+        return [self.grid.powers_w(each, self.states, k) for each in limits]
+
+    def _same(self) -> list[Ints]:
+        problem, last = self.problem, self.states.count - 1
+        numbers = np.arange(last + 1)
+        # nothing follows the last step
+        same = [np.where(numbers < self.states.rests, numbers, last)]
+        for k in range(problem.steps - 1, -1, -1):
+            same.append(self.states.same_as(float(problem.running.high_w[k]), same[-1]))
+        return same[::-1]
 
     def coasts(self, k: int, soc: float, t_cl_degc: float) -> bool:
         """Tell whether the rest of the cycle is driven with the engine off from this state."""
@@ -100,7 +135,12 @@ class Sweep:
         problem, grid, step = self.problem, self.grid, self.step(k)
         soc_axis, t_axis = grid.soc.nodes(k), grid.t_cl.nodes(k)
         target = grid.lattice(k + 1)
-        table = (self.states, step.power_count + 1, len(t_axis))
+        powers_w = self.powers_w(k)
+        counts = np.array([1 + len(each) for each in powers_w])  # off is number 0
+        power_w: Floats = np.zeros((len(counts), counts.max()))
+        for s, each in enumerate(powers_w):
+            power_w[s, 1 : counts[s]] = each
+        table = (*power_w.shape, len(t_axis))
         fuel: Floats = np.empty(table)
         weight: Floats = np.empty(table)
         column: Cells = np.empty(table, dtype=np.uint32)
@@ -108,21 +148,23 @@ class Sweep:
         kernels.temperature_tables(
             problem.maps,
             problem.constants,
-            step,
+            step.speed_mps,
+            power_w,
+            counts,
             t_axis,
-            target,
-            grid.t_cl.points,
+            target.t_cl,
             fuel,
             column,
             weight,
             run_end,
         )
+        moves = self.moves(k)
         value = np.empty_like(following)
 
         def rows(first: int, stop: int) -> None:
             kernels.bellman_rows(
-                first, stop, problem.maps, problem.constants, step, soc_axis, t_axis, target,
-                fuel, column, weight, run_end, following, value,
+                first, stop, problem.maps, problem.constants, step, moves, power_w, counts,
+                soc_axis, t_axis, target, fuel, column, weight, run_end, following, value,
             )  # fmt: skip
 
         jobs = [pool.submit(rows, *chunk) for chunk in self.chunks[1:]]
@@ -130,6 +172,12 @@ class Sweep:
         for job in jobs:
             job.result()
         return value
+
+
+def _powers(is_start: bool, limits: PowerLimits, k: int) -> Powers:
+    return Powers(
+        is_start, bool(limits.allowed[k]), float(limits.low_w[k]), float(limits.high_w[k])
+    )
 
 
 def segment_length(steps: int, value_bytes: int) -> int:
@@ -167,32 +215,33 @@ class _Forward:
         problem, grid = sweep.problem, sweep.grid
         soc, t_cl = state.soc, state.t_cl_degc
         self.soc[k], self.t_cl_degc[k] = soc, t_cl
-        if sweep.coasts(k, soc, t_cl):
+        number = sweep.states.number(state)
+        if sweep.coasts(k, soc, t_cl) and sweep.states.may_stop(number):
             command, admissible = Command(False, 0.0), True
             # only the final-SOC constraint holds the state here: its multiplier does not change
             self.soc_costate[k] = self.soc_costate[k - 1] if k > 0 else 0.0
         else:
-            target = grid.lattice(k + 1)
+            step = sweep.step(k)
             cost, on, power, admissible = kernels.best_command(
                 problem.maps,
                 problem.constants,
-                sweep.step(k),
+                step,
+                sweep.moves(k),
+                number,
+                problem.ramped_w(state),
+                sweep.powers_w(k)[1 if sweep.states.is_start[number] else 0],
                 soc,
                 t_cl,
-                state.engine_on,
                 following,
-                target,
+                grid.lattice(k + 1),
             )
             command = Command(on, power)
             if k == 0:
                 self.value_g = cost
-            before = 1 if state.engine_on and sweep.states == 2 else 0
             lattice = grid.lattice(k)
-            row = (soc - lattice.soc_origin) / lattice.soc_spacing
-            column = (t_cl - lattice.t_cl_origin) / lattice.t_cl_spacing
-            by_row, by_column = kernels.gradient(value, before, row, column)
-            self.soc_costate[k] = -by_row / lattice.soc_spacing
-            self.t_cl_costate[k] = -by_column / lattice.t_cl_spacing
+            by_soc, by_t_cl = kernels.gradient(value, number, lattice, soc, t_cl)
+            self.soc_costate[k] = -by_soc
+            self.t_cl_costate[k] = -by_t_cl
         self.state, flows = problem.plant.step(
             state, command, float(problem.demand_w[k]), float(problem.speed_mps[k])
         )
