@@ -15,7 +15,7 @@ from qpmpc.qp.expressions import code_of, expression
 from qpmpc.qp.heat_reserve import heat_reserve_k
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.quantities import Quantities
-from qpmpc.qp.rows import ROWS, SHORTEST_SCALE_S, VARIABLES, VARS, Rows, Var, cost_terms, states
+from qpmpc.qp.rows import SHORTEST_SCALE_S, VARIABLES, Rows, Var, table_of
 from qpmpc.qp.scaling import Scaling, ScalingSettings
 from qpmpc.qp.structure import QpStructure
 from qpmpc.vehicle.parameters import Vehicle
@@ -102,6 +102,8 @@ def qp_parameters(
         "engine_max_w": engine.power_max_w,
         "engine_min_w": engine.power_min_w,
         "lhv_j_per_g": engine.lhv_j_per_g,
+        "start_fuel_g": engine.start_fuel_g,
+        "cranking_j": 0.0,
         "fuel_idle_g_per_s": idle,
         "fuel_chord_g_per_j": (full - idle) / engine.power_max_w,
         **{name: float(value) for name, value in thermal.model_dump().items()},
@@ -153,7 +155,8 @@ class StageQp:
         scaling: ScalingSettings,
     ) -> None:
         self.vehicle, self.model, self.settings, self.units = vehicle, model, settings, scaling
-        self.rows = Rows(fuel=model.fuel.pieces, battery=model.battery.pieces)
+        self.table = table_of(vehicle.engine)
+        self.rows = Rows(self.table, fuel=model.fuel.pieces, battery=model.battery.pieces)
         self.structure = QpStructure(stages, self.rows)
         self.stages = stages
         parameters = qp_parameters(vehicle, model, settings, scaling)
@@ -164,21 +167,22 @@ class StageQp:
         self._each_step = self._fill_constants()
         self._before = [
             (self.rows[row.name], self.structure.places(row, entry), entry.var)
-            for row in ROWS
+            for row in self.table.rows
             for entry in row.terms
             if entry.before
         ]
-        self._weights = [(entry, code_of(factor)) for entry, factor in cost_terms().items()]
-        self._hessian = np.full((stages, VARS), settings.regularisation)
-        self._hessian[:, states()] = 0.0
-        units = [expression(variable.unit) for variable in VARIABLES.values()]
+        self._weights = [(entry, code_of(factor)) for entry, factor in self.table.cost.items()]
+        variables = self.table.variables
+        self._hessian = np.full((stages, len(variables)), settings.regularisation)
+        self._hessian[:, self.table.states] = 0.0
+        units = [expression(VARIABLES[var].unit) for var in variables]
         self._unit = np.array([self._quantities.value(code_of(unit)) for unit in units])
-        self._is_rate = np.array([variable.is_rate for variable in VARIABLES.values()])
+        self._is_rate = np.array([VARIABLES[var].is_rate for var in variables])
 
     def _fill_constants(self) -> list[tuple[Floats, CodeType]]:
         """Fill in the constant entries; return the places and formulas of the others."""
         structure, each_step = self.structure, []
-        for row in ROWS:
+        for row in self.table.rows:
             place = self.rows[row.name]
             for entry, factor in row.terms.items():
                 values = self._values[:, structure.places(row, entry)]
@@ -193,7 +197,14 @@ class StageQp:
                     bounds[:, place] = self._quantities.value(code_of(bound))
         return each_step
 
-    def update(self, stages: Stages, soc: float, t_cl_degc: float, about: Linearisation) -> QpData:
+    def update(
+        self,
+        stages: Stages,
+        soc: float,
+        t_cl_degc: float,
+        about: Linearisation,
+        engine_on: bool = False,
+    ) -> QpData:
         """Compute all values for a horizon, a state and a linearisation point.
 
         Parameters
@@ -201,17 +212,18 @@ class StageQp:
         stages : the trip ahead, n stages
         soc, t_cl_degc : state at the start of the horizon
         about : linearisation point
+        engine_on : whether the engine runs now; read where starts cost something
 
         Returns
         -------
         `QpData` in solver units, with the `Scaling` that leads back
         """
         value = self._quantities.value
-        self._quantities.update(stages, soc, about)
+        self._quantities.update(stages, soc, about, engine_on)
         for place, formula in self._each_step:
             place[:] = value(formula)
-        self._start_at({Var.SOC: soc, Var.T_CL: t_cl_degc})
-        cost = np.zeros((self.stages, VARS))
+        self._start_at({Var.SOC: soc, Var.T_CL: t_cl_degc, Var.ON: 0.0})  # on: in the bound
+        cost = np.zeros((self.stages, len(self.table.variables)))
         for entry, weight in self._weights:
             if entry.before:
                 cost[:-1, [entry.var]] += np.broadcast_to(value(weight), (self.stages, 1))[1:]

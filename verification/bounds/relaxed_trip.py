@@ -15,7 +15,6 @@ from qpmpc.preview import HorizonSettings, StageBuilder, Trace
 from qpmpc.pwa import PwaModel
 from qpmpc.pwa.model import PwaTolerances
 from qpmpc.qp import Linearisation, QpSettings, ScalingSettings, StageQp, Var
-from qpmpc.qp.rows import VARS
 from qpmpc.solvers.names import make_solver
 from qpmpc.vehicle.parameters import Vehicle
 
@@ -76,7 +75,7 @@ def relaxed_trip(cycle: Cycle, vehicle: Vehicle) -> RelaxedTrip:
         solution = solver.solve(data, None, None, cold=True)
         if not solution.usable:
             raise QpmpcError(f"relaxed trip {cycle.name}: {solution.status.value}")
-        x = data.scaling.primal(solution.primal).reshape(-1, VARS)
+        x = data.scaling.primal(solution.primal).reshape(preview.count, -1)
         ends = x[:, Var.T_CL]
         mean = 0.5 * (ends + np.concatenate([[start], ends[:-1]]))
         last, fuel_g = fuel_g, float(np.sum(stages.duration_s * under.alpha(mean) * x[:, Var.FUEL]))
