@@ -121,7 +121,7 @@ class StageBuilder:
         fields[:, n:] = (long.duration_s, long.net_w, long.speed_mps, long.internal_off_w)
         rises = np.zeros(self.count)
         rises[:seen] = 1.0
-        rises[n:] = starts_per_rise(long.rises, self.settings.classes)
+        rises[n:] = starts_per_rise(long.rises, self.settings)
         return Stages(*fields, rises)
 
     def _long_start(self, step: int) -> NDArray[np.intp]:
@@ -203,12 +203,14 @@ def _cumulative_rises(demand_class: NDArray[np.intp], classes: int) -> NDArray[n
     return sums
 
 
-def starts_per_rise(rises: NDArray[np.float64], classes: int) -> NDArray[np.float64]:
+def starts_per_rise(
+    rises: NDArray[np.float64], settings: HorizonSettings
+) -> NDArray[np.float64]:
     """Rises into each class of a block as `Stages.rises`, for stages from hard down to braking.
 
     A rise into a class starts the engine if it runs there and not below. The class below is the
     next stage, in which the on-share falls by what it rises from there: hence the sign.
     """
-    of_stage = np.zeros_like(rises).reshape(-1, classes)
-    of_stage[:, 1:] = -rises.reshape(-1, classes)[:, :-1]
+    of_stage = np.zeros_like(rises).reshape(-1, settings.classes)
+    of_stage[:, 1:] = -settings.rise_share * rises.reshape(-1, settings.classes)[:, :-1]
     return of_stage.ravel()

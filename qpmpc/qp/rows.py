@@ -58,7 +58,7 @@ VARIABLES = {
     Var.FUEL: Variable("unit_fuel_g_per_s", is_rate=True),
     Var.INTERNAL: Variable("unit_power_w", is_rate=True),
     Var.T_SLACK: Variable("unit_t_k"),
-    Var.START: Variable("1.0"),
+    Var.START: Variable("unit_start"),
 }
 
 QUANTITIES = """

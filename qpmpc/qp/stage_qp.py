@@ -128,6 +128,7 @@ def qp_parameters(
         "unit_t_k": units.t_cl_k,
         "unit_power_w": units.power_w,
         "unit_fuel_g_per_s": units.fuel_g_per_s,
+        "unit_start": units.starts,
     }
 
 
