@@ -178,7 +178,7 @@ def _context(
         return [", ".join(texts[i : i + VALUES_A_LINE]) for i in cuts]
 
     scalars = {name: literal(value) for name, value in values.scalars.items()}
-    counts = {"rule_min_on_s": str(values.min_on_s)}
+    counts = {name: str(count) for name, count in values.counts.items()}
     exponent = values.duration_exponent
     power = f"REAL_POW((duration_s), REAL({-exponent!r}))"
     return {

@@ -88,11 +88,10 @@ class Values:
     vehicle : its name
     table : of its QP
     sizes : dimensions
-    scalars, arrays : members of the runtime's `mpc_model`
+    scalars, counts, arrays : members of the runtime's `mpc_model`
     iterations, departure_iterations : K of a step and of each linearisation before the trip
     departure_linearisations, plan_valid_steps, warm_up_steps : as in the Python controller
     duration_exponent : of the column scaling
-    min_on_s : shortest engine run of the rules
     block_s : length of a block; 0 if the trip's length sets it
     """
 
@@ -104,7 +103,7 @@ class Values:
     iterations: int
     departure_iterations: int
     duration_exponent: float
-    min_on_s: int
+    counts: dict[str, int]
     block_s: int
     departure_linearisations: int = DEPARTURE_LINEARISATIONS
     plan_valid_steps: int = PLAN_VALID_STEPS
@@ -197,7 +196,11 @@ def values_of(
         iterations=settings.admm.iterations,
         departure_iterations=settings.admm.cold_iterations,
         duration_exponent=settings.scaling.duration_exponent,
-        min_on_s=rules.min_on_s,
+        counts={
+            "min_on_s": vehicle.engine.min_on_s,
+            "min_off_s": vehicle.engine.min_off_s,
+            "rule_min_on_s": max(rules.min_on_s, vehicle.engine.min_on_s),
+        },
         block_s=fixed_block_s(settings.horizon),
     )
 
@@ -226,6 +229,8 @@ def _plant(vehicle: Vehicle, line: OptimalLine, maps: BatteryMaps) -> dict[str, 
         **{f"cold_{name}": float(value) for name, value in cold.model_dump().items()},
         **{f"can_{name}": value for name, value in asdict(Capability.of(vehicle, line)).items()},
         "charge_c": maps.charge_c,
+        "start_energy_j": vehicle.engine.start_energy_j,
+        "ramp_w_per_s": vehicle.engine.ramp_w_per_s,
         "aux_power_w": vehicle.battery.aux_power_w,
         "t_cl_init_degc": vehicle.trip.t_cl_init_degc,
         "plan_voltage_v": maps.open_circuit.at(soc_init),

@@ -98,9 +98,11 @@ def sentence(vehicle: Vehicle, run: "Trajectory", excess: Excess) -> str:
 def _is_safest(layer: SafetyLayer, run: "Trajectory", k: int) -> bool:
     """Whether the safety layer leaves the command of a second as it was."""
     applied = Command(bool(run.engine_on[k]), float(run.p_eng_w[k]))
-    ran = bool(run.engine_on[k - 1]) if k else False
+    ran, before_w = (bool(run.engine_on[k - 1]), float(run.p_eng_w[k - 1])) if k else (False, 0.0)
     state = float(run.soc[k]), float(run.t_cl_degc[k]), ran
-    seen = Observation(k, *state, float(run.demand_w[k]), float(run.speed_mps[k]))
+    road = float(run.demand_w[k]), float(run.speed_mps[k])
+    # no shortest run or rest: they are weaker than any limit
+    seen = Observation(k, *state, *road, p_eng_before_w=before_w)
     best = layer.admissible(applied, seen)
     close = abs(best.p_eng_w - applied.p_eng_w) <= SAME_POWER_W
     return best.engine_on == applied.engine_on and close

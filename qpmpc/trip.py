@@ -1,6 +1,7 @@
 """One trip: a cycle, the vehicle that drives it, and its forecast."""
 
 import os
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -12,10 +13,13 @@ from qpmpc.preview.forecast import Trace
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.preview.stages import StageBuilder
 from qpmpc.vehicle import DEFAULT_VEHICLE, Plant, PlantState, Vehicle, load_vehicle
+from qpmpc.vehicle.plant import LONG_AGO_S
 
 
 class Observation(NamedTuple):
     """Measurements at the start of a step; demand and speed are those of the coming second.
+
+    The last two are not measured: a controller counts for itself (`InputMonitor`).
 
     Attributes
     ----------
@@ -25,6 +29,8 @@ class Observation(NamedTuple):
     engine_on : whether the engine ran in the last step
     demand_w : power demand at the electrical side, negative when braking
     speed_mps : mean speed
+    engine_for_s : seconds since the engine was started or stopped, as far as known
+    p_eng_before_w : its power in the last step while on; infinite if not known
     """
 
     step: int
@@ -33,6 +39,8 @@ class Observation(NamedTuple):
     engine_on: bool
     demand_w: float
     speed_mps: float
+    engine_for_s: int = LONG_AGO_S
+    p_eng_before_w: float = inf
 
 
 class Trip:

@@ -121,7 +121,7 @@ static void counts(void)
                              offsetof(mpc_state, heard.age),
                              offsetof(mpc_state, rules.power_request),
                              offsetof(mpc_state, rules.heat_request),
-                             offsetof(mpc_state, rules.on_for_s),
+                             offsetof(mpc_state, watch.good.engine_for_s),
                              offsetof(mpc_state, magic),
                              offsetof(mpc_state, magic_end)};
     const int32_t values[] = {INT32_MIN, -1, INT32_MAX};

@@ -52,6 +52,7 @@ void place_car(drive *of, source *from)
     of->car.t_cl_degc = below(from, 2) ? between(from, -60, 130)
                                        : warm[below(from, 2)] + 1e3 * aside;
     of->car.engine_on = 0;
+    of->car.engine_for_s = LONGEST_S;
 }
 
 void measure(drive *of, mpc_in *in)

@@ -2,6 +2,7 @@
 
 #include <math.h>
 
+#include "mpc_constants.h"
 #include "mpc_model.h"
 
 #define POWERS 41 /* tried from least to most */
@@ -47,13 +48,13 @@ static double current_a(double soc, double power_w)
 }
 
 /* Power of the battery: the brakes take braking power beyond what just fills it to its limit. */
-static double battery_w(const second_start *from, double p_eng_w)
+static double battery_w(const second_start *from, double p_eng_w, double cranking_w)
 {
     const double room_a = fmax((double)mpc_par.soc_max - from->soc, 0) * (double)mpc_par.charge_c;
     const double filling_w = room_a
                              * (voltage_v(from->soc) + resistance_ohm(from->soc, 0) * room_a);
     const double accepted_w = fmin(filling_w, (double)mpc_par.battery_charge_max_w);
-    const double asked_w = from->demand_w + (double)mpc_par.aux_power_w - p_eng_w;
+    const double asked_w = from->demand_w + (double)mpc_par.aux_power_w + cranking_w - p_eng_w;
     const double brakes_w = clip(-accepted_w - asked_w, 0, fmax(-from->demand_w, 0));
     return asked_w + brakes_w;
 }
@@ -89,13 +90,21 @@ static double soc_later(const second_start *from, double p_bat_w)
     return from->soc - current_a(from->soc, p_bat_w) / (double)mpc_par.charge_c;
 }
 
+static double cranking_w(const second_start *from, int engine_on)
+{
+    return (engine_on && !from->engine_on) ? (double)mpc_par.start_energy_j : 0;
+}
+
 second_start second_later(const second_start *from, int engine_on, double p_eng_w)
 {
     second_start later = *from;
-    later.soc = clip(soc_later(from, battery_w(from, p_eng_w)), 0, 1);
+    const double p_bat_w = battery_w(from, p_eng_w, cranking_w(from, engine_on));
+    later.soc = clip(soc_later(from, p_bat_w), 0, 1);
     later.t_cl_degc = clip(coolant_later_degc(from, engine_on, p_eng_w),
                            (double)mpc_par.can_coldest_degc, (double)mpc_par.can_hottest_degc);
     later.engine_on = engine_on;
+    later.p_eng_before_w = p_eng_w;
+    later.engine_for_s = (engine_on == from->engine_on) ? from->engine_for_s + 1 : 1;
     return later;
 }
 
@@ -104,9 +113,8 @@ static double beyond(double value, double low, double high)
     return fmax(fmax(low - value, value - high), 0);
 }
 
-excess excess_of(const second_start *from, int engine_on, double p_eng_w)
+static excess excess_at(const second_start *from, int engine_on, double p_eng_w, double p_bat_w)
 {
-    const double p_bat_w = battery_w(from, p_eng_w);
     const excess found = {{
         beyond(p_bat_w, -(double)mpc_par.battery_charge_max_w,
                fmin((double)mpc_par.battery_discharge_max_w, most_w(from->soc))),
@@ -115,6 +123,24 @@ excess excess_of(const second_start *from, int engine_on, double p_eng_w)
                (double)mpc_par.t_cl_max_degc),
     }};
     return found;
+}
+
+excess excess_of(const second_start *from, int engine_on, double p_eng_w)
+{
+    const double cranked_w = battery_w(from, p_eng_w, cranking_w(from, engine_on));
+    excess found = excess_at(from, engine_on, p_eng_w, battery_w(from, p_eng_w, 0));
+    const excess cranked = excess_at(from, engine_on, p_eng_w, cranked_w);
+    for (int i = 0; i < LIMITS; i++) {
+        found.of[i] = fmax(found.of[i], cranked.of[i]);
+    }
+    return found;
+}
+
+double greatest_w(const second_start *from)
+{
+    const double before_w = from->engine_on ? from->p_eng_before_w : 0;
+    const double ramped_w = before_w + (double)mpc_par.ramp_w_per_s - (double)POWER_MARGIN_W;
+    return clip(ramped_w, (double)mpc_par.engine_min_w, (double)mpc_par.engine_max_w);
 }
 
 static int better_at(const excess *other, const excess *found, const double *tolerance)
@@ -135,7 +161,7 @@ int avoidable(const second_start *from, const mpc_out *out, const double *tolera
     static const double aside_w[] = {-1000, -100, -10, -1, -0.1, 0.1, 1, 10, 100, 1000};
     const int neighbours = (int)(sizeof aside_w / sizeof aside_w[0]);
     const double least_w = (double)mpc_par.engine_min_w;
-    const double top_w = (double)mpc_par.engine_max_w;
+    const double top_w = greatest_w(from);
     const excess found = excess_of(from, out->engine_on, (double)out->p_eng_w);
     const excess off = excess_of(from, 0, 0);
     int worst = better_at(&off, &found, tolerance);
@@ -148,4 +174,36 @@ int avoidable(const second_start *from, const mpc_out *out, const double *tolera
         worst = (at >= 0) ? at : worst;
     }
     return worst;
+}
+
+/* Whether a command stays inside all limits by twice the margins of the safety layer. */
+static int is_well_inside(const second_start *from, int engine_on, double p_eng_w)
+{
+    const double t = coolant_later_degc(from, engine_on, p_eng_w);
+    int inside = t >= (double)mpc_par.t_cl_min_degc + 2 * (double)T_CL_MARGIN_K
+                 && t <= (double)mpc_par.t_cl_max_degc - 2 * (double)T_CL_MARGIN_K;
+    for (int cranked = 0; cranked < 2; cranked++) {
+        const double p_bat_w = battery_w(from, p_eng_w, cranked ? cranking_w(from, engine_on) : 0);
+        const double soc = soc_later(from, p_bat_w);
+        inside &= p_bat_w >= -(double)mpc_par.battery_charge_max_w + 2 * (double)POWER_MARGIN_W
+                  && p_bat_w <= (double)mpc_par.battery_discharge_max_w - 2 * (double)POWER_MARGIN_W
+                  && soc >= (double)mpc_par.soc_min + 2 * (double)SOC_MARGIN
+                  && soc <= (double)mpc_par.soc_max - 2 * (double)SOC_MARGIN;
+    }
+    return inside;
+}
+
+int cut_short(const second_start *from, const mpc_out *out)
+{
+    const double least_w = (double)mpc_par.engine_min_w;
+    const int32_t shortest_s = from->engine_on ? mpc_par.min_on_s : mpc_par.min_off_s;
+    if (from->engine_for_s >= shortest_s || out->engine_on == from->engine_on) {
+        return 0;
+    }
+    int could_go_on = 0;
+    for (int i = 0; i < POWERS; i++) {
+        const double power_w = least_w + (greatest_w(from) - least_w) * i / (POWERS - 1);
+        could_go_on |= is_well_inside(from, from->engine_on, from->engine_on ? power_w : 0);
+    }
+    return could_go_on;
 }

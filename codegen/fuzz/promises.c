@@ -18,9 +18,10 @@ void require(int fine, const char *what, const mpc_state *state, const mpc_out *
     if (!fine) {
         fprintf(stderr, "%s; flags %d rung %d on %d power %.9g\n", what, (int)out->flags,
                 (int)out->rung, (int)out->engine_on, (double)out->p_eng_w);
-        fprintf(stderr, "used: SOC %.9g coolant %.9g demand %.9g speed %.9g on %d\n",
-                (double)used->soc, (double)used->t_cl_degc, (double)used->demand_w,
-                (double)used->speed_mps, (int)used->engine_on);
+        fprintf(stderr, "used: SOC %.9g coolant %.9g demand %.9g speed %.9g\n", (double)used->soc,
+                (double)used->t_cl_degc, (double)used->demand_w, (double)used->speed_mps);
+        fprintf(stderr, "on %d for %d s, power before %.9g\n", (int)used->engine_on,
+                (int)used->engine_for_s, (double)used->p_eng_before_w);
         abort();
     }
 }
@@ -38,10 +39,10 @@ static int is_declared(const mpc_out *out)
     return fine && (out->rung == MPC_RULES || !(out->flags & MPC_BAD_STATE));
 }
 
-static int is_in_range(const mpc_out *out)
+static int is_in_range(const second_start *told, const mpc_out *out)
 {
     const int is_on = out->engine_on == 1 && out->p_eng_w >= mpc_par.engine_min_w
-                      && out->p_eng_w <= mpc_par.engine_max_w;
+                      && (double)out->p_eng_w <= greatest_w(told) + tolerance[0];
     const int is_off = out->engine_on == 0 && same(out->p_eng_w, 0);
     return (is_on || is_off) && isfinite(out->on_share) && isfinite(out->relaxation_gap);
 }
@@ -57,12 +58,15 @@ void check_promises(const mpc_state *state, const mpc_in *in, const mpc_out *out
 {
     static const char *const names[] = {"avoidable: power", "avoidable: SOC", "avoidable: coolant"};
     const mpc_measured *const used = &state->watch.good;
-    const second_start told = {(double)used->soc, (double)used->t_cl_degc, (double)used->demand_w,
-                               (double)used->speed_mps, used->engine_on};
+    const second_start told = {(double)used->soc,      (double)used->t_cl_degc,
+                               (double)used->demand_w, (double)used->speed_mps,
+                               used->engine_on,        (double)used->p_eng_before_w,
+                               used->engine_for_s};
     require(out->flags == returned && is_declared(out), "undeclared status", state, out);
-    require(is_in_range(out), "command out of range", state, out);
+    require(is_in_range(&told, out), "command out of range", state, out);
     require((out->flags & MPC_BAD_MEASUREMENT) || is_as_given(used, in),
             "a measurement replaced without a flag", state, out);
     const int limit = avoidable(&told, out, tolerance);
     require(limit < 0, names[(limit < 0) ? 0 : limit], state, out);
+    require(!cut_short(&told, out), "a run or rest cut short", state, out);
 }

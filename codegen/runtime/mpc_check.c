@@ -3,7 +3,8 @@
  * A measured SOC or coolant temperature is possible if the car could have got there from the value
  * that the model predicts from the last good one: the reach grows with the seconds since. Else the
  * prediction is used. Demand and speed are possible if the car can do them; else the last good ones
- * are used. Time is counted on where the clock is wrong.
+ * are used. Time is counted on where the clock is wrong. The seconds since the engine was started or
+ * stopped, and its power in the last second, are known from what was measured and commanded before.
  */
 #include "mpc_constants.h"
 #include "mpc_heat.h"
@@ -39,13 +40,14 @@ int32_t mpc_check_state(const mpc_state *state)
         fine &= within(state->cost, LEAST_COST, REAL(1.0) / LEAST_COST);
     }
     fine &= is_count(rules->power_request, 1) & is_count(rules->heat_request, 1);
-    fine &= is_count(rules->on_for_s, mpc_par.rule_min_on_s);
     fine &= is_count(watch->soc_since_s, LONG_AGO_S) & is_count(watch->t_cl_since_s, LONG_AGO_S);
     fine &= is_count(watch->has_clock, 1) & is_count(watch->command_on, 1);
     fine &= within(watch->command_w, REAL(0.0), mpc_par.engine_max_w);
     fine &= within(watch->good.soc, REAL(0.0), REAL(1.0));
     fine &= within(watch->good.t_cl_degc, mpc_par.can_coldest_degc, mpc_par.can_hottest_degc);
     fine &= mpc_check_second(watch->good.demand_w, watch->good.speed_mps);
+    fine &= within(watch->good.p_eng_before_w, REAL(0.0), mpc_par.engine_max_w);
+    fine &= is_count(watch->good.engine_for_s, LONG_AGO_S);
     return fine & is_count(watch->good.engine_on, 1);
 }
 
@@ -70,14 +72,19 @@ static void predict(const mpc_watch *watch, mpc_real *soc, mpc_real *t_cl_degc)
 {
     const mpc_measured *const good = &watch->good;
     const mpc_real accepted_w = mpc_map_charge_limit_w(good->soc);
-    mpc_real p_bat_w = (good->demand_w + mpc_par.aux_power_w) - watch->command_w;
+    const int32_t starts = ((watch->command_on != 0) && (good->engine_on == 0)) ? 1 : 0;
+    const mpc_real start_g = (starts != 0) ? mpc_par.start_fuel_g : REAL(0.0);
+    const mpc_real cranking_w = (starts != 0) ? mpc_par.start_energy_j : REAL(0.0);
+    const mpc_real aux_w = mpc_par.aux_power_w + cranking_w;
+    mpc_real p_bat_w = (good->demand_w + aux_w) - watch->command_w;
     if ((p_bat_w < -accepted_w) && (good->demand_w < REAL(0.0))) {
         /* the brakes take what the battery cannot */
-        p_bat_w = real_min(-accepted_w, mpc_par.aux_power_w - watch->command_w);
+        p_bat_w = real_min(-accepted_w, aux_w - watch->command_w);
     }
     const mpc_real current_a = mpc_map_current_a(good->soc, p_bat_w);
-    const mpc_real fuel_w = mpc_map_cold_factor(good->t_cl_degc) * mpc_par.lhv_j_per_g
-                            * mpc_map_fuel_g_per_s(watch->command_w);
+    const mpc_real hot_g_per_s = mpc_map_fuel_g_per_s(watch->command_w);
+    const mpc_real fuel_g = (mpc_map_cold_factor(good->t_cl_degc) * hot_g_per_s) + start_g;
+    const mpc_real fuel_w = fuel_g * mpc_par.lhv_j_per_g;
     const mpc_real engine_w = heat_engine_w(fuel_w, watch->command_w);
     const mpc_real heat_w = ((watch->command_on != 0) ? engine_w : REAL(0.0))
                             - heat_cooling_w(good->t_cl_degc, good->speed_mps);
@@ -104,14 +111,38 @@ static int32_t later(int32_t since_s, int32_t passed_s)
     return (sum_s < LONG_AGO_S) ? sum_s : LONG_AGO_S;
 }
 
+/* Seconds since the engine was started or stopped, with the last command if at all, and its power
+ * in the last second. Nothing is known at first, nor of the power of an engine that runs without a
+ * command. In the same second again the first command does not count. */
+static void know_engine(mpc_watch *watch, int32_t was_on, int32_t is_first, int32_t passed)
+{
+    mpc_measured *const good = &watch->good;
+    if (is_first != 0) {
+        good->engine_for_s = LONG_AGO_S;
+    } else if (good->engine_on == was_on) {
+        good->engine_for_s = later(good->engine_for_s, passed);
+    } else {
+        good->engine_for_s = (passed > 0) ? passed : 1;
+    }
+    if (good->engine_on == 0) {
+        good->p_eng_before_w = REAL(0.0);
+    } else if ((was_on == 0) || (passed > 0)) {
+        good->p_eng_before_w = (watch->command_on != 0) ? watch->command_w : mpc_par.engine_max_w;
+    } else {
+        /* as it was */
+    }
+}
+
 int32_t mpc_check_measured(mpc_watch *watch, const mpc_in *in, int32_t *elapsed)
 {
     mpc_measured *const good = &watch->good;
+    const int32_t was_on = good->engine_on;
+    const int32_t is_first = (watch->has_clock == 0) ? 1 : 0;
     int32_t flags = 0;
     mpc_real soc = good->soc;
     mpc_real t_cl_degc = good->t_cl_degc;
     *elapsed = elapsed_s(watch, in->second, &flags);
-    const int32_t passed = (watch->has_clock != 0) ? *elapsed : 0;
+    const int32_t passed = (is_first != 0) ? 0 : *elapsed;
     watch->has_clock = 1;
     watch->soc_since_s = later(watch->soc_since_s, passed);
     watch->t_cl_since_s = later(watch->t_cl_since_s, passed);
@@ -143,5 +174,6 @@ int32_t mpc_check_measured(mpc_watch *watch, const mpc_in *in, int32_t *elapsed)
         good->engine_on = watch->command_on;
         fine = 0;
     }
+    know_engine(watch, was_on, is_first, passed);
     return flags | ((fine != 0) ? 0 : MPC_BAD_MEASUREMENT);
 }

@@ -50,7 +50,7 @@ int32_t mpc_solver_iterate(mpc_state *state, int32_t count);
 
 /* mpc_safety.c, mpc_rules.c, mpc_check.c */
 mpc_command mpc_safety_admissible(mpc_command wish, const mpc_measured *seen);
-mpc_command mpc_rules_decide(mpc_rule_memory *memory, const mpc_measured *seen, int32_t elapsed);
+mpc_command mpc_rules_decide(mpc_rule_memory *memory, const mpc_measured *seen);
 int32_t mpc_check_state(const mpc_state *state);
 int32_t mpc_check_measured(mpc_watch *watch, const mpc_in *in, int32_t *elapsed);
 int32_t mpc_check_second(mpc_real demand_w, mpc_real speed_mps);

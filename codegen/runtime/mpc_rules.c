@@ -3,16 +3,17 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-mpc_command mpc_rules_decide(mpc_rule_memory *memory, const mpc_measured *seen, int32_t elapsed)
+mpc_command mpc_rules_decide(mpc_rule_memory *memory, const mpc_measured *seen)
 {
     const mpc_real net_w = seen->demand_w + mpc_par.aux_power_w;
     const mpc_real requested_w = net_w
                                  + (mpc_par.rule_k_soc_w * (mpc_par.rule_soc_ref - seen->soc));
-    const int32_t long_enough = (memory->on_for_s >= mpc_par.rule_min_on_s) ? 1 : 0;
+    const int32_t too_short = (seen->engine_for_s < mpc_par.rule_min_on_s) ? 1 : 0;
+    const int32_t is_held = seen->engine_on & too_short;
     if ((requested_w > mpc_par.rule_on_w) || (seen->soc < mpc_par.rule_soc_forced)
         || (net_w > mpc_par.battery_discharge_max_w)) {
         memory->power_request = 1;
-    } else if ((requested_w < mpc_par.rule_off_w) && (long_enough != 0)) {
+    } else if ((requested_w < mpc_par.rule_off_w) && (is_held == 0)) {
         memory->power_request = 0;
     } else {
         /* between the thresholds: as before */
@@ -28,18 +29,11 @@ mpc_command mpc_rules_decide(mpc_rule_memory *memory, const mpc_measured *seen, 
     if (memory->power_request != 0) {
         wish.engine_on = 1;
         wish.p_eng_w = real_max(requested_w, mpc_par.rule_power_min_w);
-    } else if ((memory->heat_request != 0) || ((memory->on_for_s > 0) && (long_enough == 0))) {
+    } else if ((memory->heat_request != 0) || (is_held != 0)) {
         wish.engine_on = 1;
         wish.p_eng_w = mpc_par.rule_heat_power_w;
     } else {
         /* engine off */
     }
-    const mpc_command command = mpc_safety_admissible(wish, seen);
-    if (command.engine_on == 0) {
-        memory->on_for_s = 0;
-    } else { /* stops at the shortest run, so that it cannot overflow */
-        const int32_t on_for_s = memory->on_for_s + elapsed;
-        memory->on_for_s = (on_for_s < mpc_par.rule_min_on_s) ? on_for_s : mpc_par.rule_min_on_s;
-    }
-    return command;
+    return wish;
 }

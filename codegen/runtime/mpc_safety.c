@@ -3,7 +3,8 @@
  * Whatever the optimiser returned, the result is finite and in range, and no other command exceeds
  * the limits by less: first battery and engine power, then SOC, then coolant; where all are kept,
  * in the same order the limits drawn in by a margin. Of such commands it takes the one nearest to
- * the wish: the same on or off where possible, then the nearest power.
+ * the wish: the same on or off where possible, then the nearest power. While the shortest run or
+ * rest of the engine is not over, the wish is that it goes on.
  */
 #include "mpc_constants.h"
 #include "mpc_heat.h"
@@ -39,7 +40,33 @@ static interval narrowed(interval own, interval to)
     return both;
 }
 
-/* Brakes take braking power that the battery cannot: it then has to take P_eng - P_aux at most. */
+/* With the lower end raised, to the upper one at most. */
+static interval raised(interval of, mpc_real by)
+{
+    const interval result = {real_min(of.low + by, of.high), of.high};
+    return result;
+}
+
+/* The engine's own powers, from the last one no further up than its ramp. */
+static interval of_engine(const mpc_measured *seen)
+{
+    const mpc_real before_w = (seen->engine_on != 0) ? seen->p_eng_before_w : REAL(0.0);
+    const mpc_real ramped_w = (before_w + mpc_par.ramp_w_per_s) - POWER_MARGIN_W;
+    const interval allowed = {mpc_par.engine_min_w,
+                              real_clip(ramped_w, mpc_par.engine_min_w, mpc_par.engine_max_w)};
+    return allowed;
+}
+
+/* Whether the engine is wished on; as it is while its shortest run or rest lasts. */
+static int32_t goes_on(mpc_command wish, const mpc_measured *seen)
+{
+    const int32_t shortest_s = (seen->engine_on != 0) ? mpc_par.min_on_s : mpc_par.min_off_s;
+    return (seen->engine_for_s < shortest_s) ? seen->engine_on : wish.engine_on;
+}
+
+/* Brakes take braking power that the battery cannot: it then has to take P_eng - P_aux at most.
+ * Here as for SOC the power that cranks a starting engine is left out: it raises the lower end, but
+ * never helps to discharge. */
 static interval of_battery(const mpc_measured *seen, mpc_real margin)
 {
     const mpc_real net_w = seen->demand_w + mpc_par.aux_power_w;
@@ -133,7 +160,8 @@ mpc_command mpc_safety_admissible(mpc_command wish, const mpc_measured *seen)
     const mpc_real start_g = (seen->engine_on != 0) ? REAL(0.0) : mpc_par.start_fuel_g;
     const engine_heat heat = {mpc_map_cold_factor(seen->t_cl_degc) * mpc_par.lhv_j_per_g,
                               heat_engine_w(mpc_par.lhv_j_per_g * start_g, REAL(0.0))};
-    interval running = {mpc_par.engine_min_w, mpc_par.engine_max_w};
+    const mpc_real cranking_w = (seen->engine_on != 0) ? REAL(0.0) : mpc_par.start_energy_j;
+    interval running = of_engine(seen);
     mpc_real on[2 * LIMITS];
     mpc_real off[2 * LIMITS];
     for (int32_t tier = 0; tier < 2; tier++) {
@@ -143,8 +171,9 @@ mpc_command mpc_safety_admissible(mpc_command wish, const mpc_measured *seen)
         powers[1] = of_soc(seen, margin);
         const int32_t first = tier * LIMITS;
         for (int32_t i = 0; i < (LIMITS - 1); i++) {
-            running = narrowed(running, powers[i]);
-            on[first + i] = distance(powers[i], running.low);
+            const interval powers_on = raised(powers[i], cranking_w);
+            running = narrowed(running, powers_on);
+            on[first + i] = distance(powers_on, running.low);
             off[first + i] = distance(powers[i], REAL(0.0));
         }
         const interval warmth = of_heat(seen, margin);
@@ -160,7 +189,7 @@ mpc_command mpc_safety_admissible(mpc_command wish, const mpc_measured *seen)
         off[first + LIMITS - 1] = distance(warmth, REAL(0.0));
     }
     mpc_command command = {REAL(0.0), 0};
-    if (better(wish.engine_on, on, off) != 0) {
+    if (better(goes_on(wish, seen), on, off) != 0) {
         const int32_t wanted = ((wish.engine_on != 0) && (wish.p_eng_w >= REAL(0.0))) ? 1 : 0;
         command.engine_on = 1; /* at the power wished for; a NaN is none */
         command.p_eng_w =

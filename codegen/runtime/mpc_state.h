@@ -38,16 +38,18 @@ typedef struct {
 typedef struct {
     int32_t power_request;
     int32_t heat_request;
-    int32_t on_for_s;
 } mpc_rule_memory;
 
-/* The measured values in use: the last good ones. */
+/* The measured values in use: the last good ones; and what is known of the engine from those and
+ * the commands before. */
 typedef struct {
     mpc_real soc;
     mpc_real t_cl_degc;
     mpc_real demand_w;
     mpc_real speed_mps;
+    mpc_real p_eng_before_w; /* power in the last second; the greatest while on if not known */
     int32_t engine_on;
+    int32_t engine_for_s; /* since it was started or stopped */
 } mpc_measured;
 
 /* Memory of the checks of measurements. */

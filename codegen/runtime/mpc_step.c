@@ -213,7 +213,7 @@ int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out)
     mpc_watch *const watch = &state->watch;
     out->flags |= mpc_check_measured(watch, in, &elapsed);
     /* the rules are evaluated every second, so that their memory is right if they take over */
-    mpc_command command = mpc_rules_decide(&state->rules, &watch->good, elapsed);
+    mpc_command command = mpc_rules_decide(&state->rules, &watch->good);
     const int32_t passed = (state->is_under_way != 0) ? elapsed : 0;
     move_on(state, passed);
     int32_t is_new = 0;
@@ -232,8 +232,9 @@ int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out)
     }
     if ((state->old_age <= MPC_PLAN_VALID_STEPS) && (state->old_age < MPC_SHORT)) {
         out->rung = (is_new != 0) ? MPC_OPTIMISED : MPC_SHIFTED_PLAN;
-        command = mpc_safety_admissible(realise(state), &watch->good);
+        command = realise(state);
     }
+    command = mpc_safety_admissible(command, &watch->good);
     watch->command_on = command.engine_on;
     watch->command_w = command.p_eng_w;
     out->engine_on = command.engine_on;

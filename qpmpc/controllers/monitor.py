@@ -9,9 +9,8 @@ from qpmpc.trip import Observation
 from qpmpc.vehicle.capability import Capability
 from qpmpc.vehicle.engine import alpha_at
 from qpmpc.vehicle.heat import cooling_w, engine_w
-from qpmpc.vehicle.plant import Command, Plant
+from qpmpc.vehicle.plant import LONG_AGO_S, Command, Plant
 
-LONG_AGO_S = 1_000_000  # since the last good measurement: none yet
 LONGEST_GAP_S = 20  # seconds that may be missed; beyond, or backwards, the clock is wrong
 
 
@@ -39,7 +38,9 @@ class InputMonitor:
     A measured SOC or coolant temperature is plausible if the car could have got there from the
     value that the model predicts from the last good one: the reach grows with the seconds since.
     Else the prediction is used. Demand and speed are plausible if the car can do them; else the
-    last good ones are used. Time is counted on where the clock is wrong.
+    last good ones are used. Time is counted on where the clock is wrong. The seconds since the
+    engine was started or stopped, and its power in the last second, are known from what was
+    measured and commanded before.
 
     Parameters
     ----------
@@ -49,6 +50,7 @@ class InputMonitor:
     def __init__(self, plant: Plant) -> None:
         self._plant = plant
         self._can = Capability.of(plant.vehicle, plant.line)
+        self._power_max_w = plant.vehicle.engine.power_max_w
         self.forget()
 
     def forget(self) -> None:
@@ -66,7 +68,8 @@ class InputMonitor:
     def checked(self, seen: Observation) -> tuple[Observation, Flag]:
         """Return the observation to be used, and what was wrong with the one given."""
         elapsed, flags = self._elapsed(seen.step)
-        step = seen.step if self._clock is None else self._good.step + elapsed
+        first = self._clock is None
+        step = seen.step if first else self._good.step + elapsed
         self._clock = seen.step
         soc, t_cl_degc = self._predicted(elapsed)
         can, since = self._can, min(self._soc_since_s + elapsed, LONG_AGO_S)
@@ -84,6 +87,7 @@ class InputMonitor:
         good_speed = 0.0 <= seen.speed_mps <= can.speed_max_mps
         if not (good_soc and good_t_cl and good_demand and good_speed):
             flags |= Flag.BAD_MEASUREMENT
+        engine_for_s, p_eng_before_w = self._engine_before(seen, elapsed, first)
         self._good = Observation(
             step,
             seen.soc if good_soc else soc,
@@ -91,8 +95,29 @@ class InputMonitor:
             bool(seen.engine_on),
             seen.demand_w if good_demand else self._good.demand_w,
             seen.speed_mps if good_speed else self._good.speed_mps,
+            engine_for_s,
+            p_eng_before_w,
         )
         return self._good, flags
+
+    def _engine_before(self, seen: Observation, elapsed: int, first: bool) -> tuple[int, float]:
+        """Seconds since the engine was started or stopped, and its power in the last second.
+
+        It was started or stopped with the last command, if at all. Nothing is known at first, nor
+        of the power of an engine that runs without a command.
+        """
+        good, command = self._good, self._command
+        if first:
+            for_s = LONG_AGO_S
+        elif bool(seen.engine_on) == good.engine_on:
+            for_s = min(good.engine_for_s + elapsed, LONG_AGO_S)
+        else:
+            for_s = max(elapsed, 1)
+        if not seen.engine_on:
+            return for_s, 0.0
+        if good.engine_on and elapsed == 0:  # the same second: its first command does not count
+            return for_s, good.p_eng_before_w
+        return for_s, command.p_eng_w if command.engine_on else self._power_max_w
 
     def _elapsed(self, step: int) -> tuple[int, Flag]:
         """Seconds since the last call, one where the clock cannot be believed."""
@@ -110,6 +135,10 @@ class InputMonitor:
             return good.soc, good.t_cl_degc
         vehicle, maps, h = self._plant.vehicle, self._plant.battery, self._plant.step_s
         aux_w, thermal = vehicle.battery.aux_power_w, vehicle.thermal
+        start_fuel_g = 0.0
+        if command.engine_on and not good.engine_on:
+            start_fuel_g = vehicle.engine.start_fuel_g
+            aux_w += vehicle.engine.start_energy_j / h
         p_bat = good.demand_w + aux_w - command.p_eng_w
         accepted = maps.charge_limit_w(good.soc, h)
         if p_bat < -accepted:  # the brakes take what the battery cannot
@@ -117,8 +146,9 @@ class InputMonitor:
         soc = good.soc - h * maps.current_a(good.soc, p_bat) / maps.charge_c
         heat_w = -cooling_w(thermal, good.t_cl_degc, good.speed_mps)
         if command.engine_on:
-            fuel_w = alpha_at(vehicle.cold_engine, good.t_cl_degc) * vehicle.engine.lhv_j_per_g
-            fuel_w *= self._plant.line.fuel.at(command.p_eng_w)
+            hot_g_per_s = self._plant.line.fuel.at(command.p_eng_w)
+            fuel_g = h * alpha_at(vehicle.cold_engine, good.t_cl_degc) * hot_g_per_s + start_fuel_g
+            fuel_w = fuel_g / h * vehicle.engine.lhv_j_per_g
             heat_w += engine_w(thermal, fuel_w, command.p_eng_w)
         t_cl_degc = good.t_cl_degc + h * heat_w / thermal.heat_capacity_j_per_k
         return min(max(soc, 0.0), 1.0), min(

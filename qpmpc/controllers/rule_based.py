@@ -34,7 +34,6 @@ class RuleBased(Controller):
     """
 
     name = "rule-based"
-    has_safety_layer = True  # its timers count the applied command
 
     def __init__(
         self,
@@ -46,31 +45,29 @@ class RuleBased(Controller):
         self.rules = rules or self.settings.rule_based
         self._power_request = False
         self._heat_request = False
-        self._on_for_s = 0
-        self._last_step: int | None = None
 
     def depart(self, progress: Progress | None = None) -> None:
         """Reset the rules."""
         self._power_request = self._heat_request = False
-        self._on_for_s = 0
-        self._last_step = None
 
     def forget(self) -> None:
-        """Forget measurements and timers, as after a restart of the ECU under way."""
+        """Forget measurements and requests, as after a restart of the ECU under way."""
         super().forget()
         self.depart()
 
     def step(self, seen: Observation) -> Command:
-        """Apply the rules, then the safety layer."""
+        """Apply the rules."""
         s, vehicle = self.rules, self.trip.vehicle
         battery = vehicle.battery
         net_w = seen.demand_w + battery.aux_power_w
         reference = vehicle.trip.soc_init + s.soc_ref_offset
         requested = net_w + s.k_soc_w * (reference - seen.soc)
         forced = seen.soc < s.soc_forced or net_w > battery.power_discharge_max_w
+        shortest_s = max(s.min_on_s, vehicle.engine.min_on_s)
+        is_held = seen.engine_on and seen.engine_for_s < shortest_s
         if requested > s.on_w or forced:
             self._power_request = True
-        elif requested < s.off_w and self._on_for_s >= s.min_on_s:
+        elif requested < s.off_w and not is_held:
             self._power_request = False
         if seen.t_cl_degc < s.heat_on_degc:
             self._heat_request = True
@@ -79,10 +76,6 @@ class RuleBased(Controller):
         wish = Command(False, 0.0)
         if self._power_request:
             wish = Command(True, max(requested, s.power_min_w))
-        elif self._heat_request or 0 < self._on_for_s < s.min_on_s:
+        elif self._heat_request or is_held:
             wish = Command(True, s.heat_power_w)
-        command = self.safety.admissible(wish, seen)
-        elapsed = 1 if self._last_step is None else seen.step - self._last_step
-        self._last_step = seen.step
-        self._on_for_s = self._on_for_s + elapsed if command.engine_on else 0
-        return command
+        return wish

@@ -12,7 +12,8 @@ from qpmpc.vehicle.engine import alpha_at
 from qpmpc.vehicle.heat import cooling_w, engine_w
 from qpmpc.vehicle.plant import Command, Plant
 
-# Kept from the limits where that is possible: rounding, in single precision too, stays inside.
+# Kept from the limits where that is possible, and always from the ramp: rounding, in single
+# precision too, stays inside.
 POWER_MARGIN_W = 0.1
 SOC_MARGIN = 1e-5
 T_CL_MARGIN_K = 0.02
@@ -35,6 +36,10 @@ class Interval(NamedTuple):
             max(min(self.high_w, to.high_w), self.low_w),
         )
 
+    def raised(self, by_w: float) -> "Interval":
+        """The interval with its lower end raised, to the upper one at most."""
+        return Interval(min(self.low_w + by_w, self.high_w), self.high_w)
+
 
 class SafetyLayer:
     """Corrects a command so that the next second keeps power, SOC and coolant limits.
@@ -42,7 +47,8 @@ class SafetyLayer:
     Whatever the optimiser returned, the result is finite and in range, and no other command
     exceeds the limits by less: first battery and engine power, then SOC, then coolant; where all
     are kept, in the same order the limits drawn in by a margin. Of such commands it takes the one
-    nearest to the wish: the same on or off where possible, then the nearest power.
+    nearest to the wish: the same on or off where possible, then the nearest power. While the
+    shortest run or rest of the engine is not over, the wish is that it goes on.
 
     Parameters
     ----------
@@ -59,13 +65,15 @@ class SafetyLayer:
         """Return the admissible command nearest to `wish`."""
         engine = self._vehicle.engine
         heat = _EngineHeat(self, seen)
-        running = Interval(engine.power_min_w, engine.power_max_w)
+        running = Interval(engine.power_min_w, self._greatest_w(seen))
+        cranking_w = 0.0 if seen.engine_on else engine.start_energy_j / self._plant.step_s
         on_excess: list[float] = []
         off_excess: list[float] = []
         for margin in (False, True):
             for allowed in (self._battery_w(seen, margin), self._soc_w(seen, margin)):
-                running = running.narrowed(allowed)
-                on_excess.append(allowed.distance_w(running.low_w))
+                allowed_on = allowed.raised(cranking_w)
+                running = running.narrowed(allowed_on)
+                on_excess.append(allowed_on.distance_w(running.low_w))
                 off_excess.append(allowed.distance_w(0.0))
             allowed_heat = self._heat_w(seen, margin)
             if allowed_heat.low_w <= 0.0 and heat.most_w <= allowed_heat.high_w:
@@ -77,17 +85,32 @@ class SafetyLayer:
             kept = by_heat.low_w <= running.low_w <= by_heat.high_w  # whatever rounding leaves
             on_excess.append(0.0 if kept else allowed_heat.distance_w(heat.of(running.low_w)))
             off_excess.append(allowed_heat.distance_w(0.0))
-        on = bool(wish.engine_on) if on_excess == off_excess else on_excess < off_excess
+        wish_on = self._goes_on(wish, seen)
+        on = wish_on if on_excess == off_excess else on_excess < off_excess
         if not on:
             return Command(False, 0.0)
         wanted_w = wish.p_eng_w if wish.engine_on and wish.p_eng_w >= 0.0 else 0.0  # nor nan
         return Command(True, min(max(wanted_w, running.low_w), running.high_w))
 
+    def _greatest_w(self, seen: Observation) -> float:
+        """Greatest power of the running engine: its own, or what the ramp leads to."""
+        engine = self._vehicle.engine
+        before_w = seen.p_eng_before_w if seen.engine_on else 0.0
+        ramped_w = before_w + engine.ramp_w_per_s * self._plant.step_s - POWER_MARGIN_W
+        return max(min(ramped_w, engine.power_max_w), engine.power_min_w)
+
+    def _goes_on(self, wish: Command, seen: Observation) -> bool:
+        """Whether the engine is wished on; as it is while its shortest run or rest lasts."""
+        engine = self._vehicle.engine
+        shortest_s = engine.min_on_s if seen.engine_on else engine.min_off_s
+        return bool(seen.engine_on if seen.engine_for_s < shortest_s else wish.engine_on)
+
     def _battery_w(self, seen: Observation, margin: bool) -> Interval:
         """Engine powers at which the battery's power stays in its limits.
 
         Friction brakes take braking power that the battery cannot: while braking it has to take
-        no more than P_eng - P_aux.
+        no more than P_eng - P_aux. Here as for SOC the power that cranks a starting engine is left
+        out: it raises the lower end (`Interval.raised`), but never helps to discharge.
         """
         battery = self._vehicle.battery
         net_w, drawn_w = seen.demand_w + battery.aux_power_w, POWER_MARGIN_W * margin

@@ -279,7 +279,7 @@ class Table:
 
 def table_of(engine: Engine) -> Table:
     """Return the table of a vehicle with this engine."""
-    return Table(engine.start_fuel_g > 0.0, False)
+    return Table(engine.start_fuel_g > 0.0, engine.start_energy_j > 0.0)
 
 
 class Rows:

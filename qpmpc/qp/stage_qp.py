@@ -103,7 +103,7 @@ def qp_parameters(
         "engine_min_w": engine.power_min_w,
         "lhv_j_per_g": engine.lhv_j_per_g,
         "start_fuel_g": engine.start_fuel_g,
-        "cranking_j": 0.0,
+        "cranking_j": cranking_j(vehicle, model),
         "fuel_idle_g_per_s": idle,
         "fuel_chord_g_per_j": (full - idle) / engine.power_max_w,
         **{name: float(value) for name, value in thermal.model_dump().items()},
@@ -130,6 +130,18 @@ def qp_parameters(
         "unit_fuel_g_per_s": units.fuel_g_per_s,
         "unit_start": units.starts,
     }
+
+
+def cranking_j(vehicle: Vehicle, model: PwaModel) -> float:
+    """Energy that a start takes out of the battery's store.
+
+    l(P_aux + E / 1 s) - l(P_aux) for 1 s, with E the energy that cranks the engine and l the
+    fitted curve of internal power: as if the car stood. At the power of driving the loss is
+    another, by a tenth of E at most.
+    """
+    aux_w = vehicle.battery.aux_power_w
+    with_start, without = model.battery(np.array([aux_w + vehicle.engine.start_energy_j, aux_w]))
+    return float(with_start - without)
 
 
 class StageQp:

@@ -39,6 +39,7 @@ Voltages = Annotated[tuple[Annotated[float, Field(ge=1.0, le=2e3)], ...], _ARRAY
 Resistances = Annotated[tuple[Annotated[float, Field(ge=1e-5, le=100.0)], ...], _ARRAY]
 
 STEP_S = 1.0  # of plant and controllers: nothing may empty, heat or cool down within one
+CRANKING_SHARE = 0.5  # of the battery's greatest power: a start leaves some to drive with
 COLDEST_DEGC = -50.0  # at which the cold engine's fuel is checked
 COLD_FACTOR_MAX = 10.0
 SPEED_MAX_MPS = 70.0  # at which forces and losses are checked
@@ -93,7 +94,12 @@ class Chassis(Section):
 
 
 class Engine(Section):
-    """Fuel map P_fuel = K(N) V_L N/60 + P_eng / indicated efficiency, torque limit, fuel."""
+    """Fuel map P_fuel = K(N) V_L N/60 + P_eng / indicated efficiency, torque limit, fuel, starts.
+
+    A start takes `start_fuel_g`, and from the battery the energy `start_energy_j` that cranks the
+    engine. Started, it is to run for `min_on_s`, stopped, to rest for `min_off_s`. While on its
+    power rises by no more than `ramp_w_per_s`, at the start from 0; it falls at once.
+    """
 
     displacement_l: Annotated[float, Field(ge=0.05, le=20.0)]
     power_max_w: Annotated[float, Field(ge=500.0, le=500e3)]
@@ -106,6 +112,10 @@ class Engine(Section):
     torque_speed_rpm: Speeds
     torque_max_nm: Torques
     start_fuel_g: Annotated[float, Field(ge=0.0, le=10.0)]  # burnt within a second
+    start_energy_j: Annotated[float, Field(ge=0.0, le=250e3)] = 0.0  # drawn within a second
+    min_on_s: Annotated[int, Field(ge=0, le=600)] = 0
+    min_off_s: Annotated[int, Field(ge=0, le=600)] = 0
+    ramp_w_per_s: Annotated[float, Field(gt=0.0, le=1e6)] = 1e6  # free: no engine has so much power
 
     @property
     def lhv_j_per_g(self) -> float:
@@ -126,6 +136,11 @@ class Engine(Section):
             raise ValueError("friction_speed_rpm and torque_speed_rpm must have speeds in common")
         if self.power_min_w >= self.power_max_w:
             raise ValueError("power_min_w must be below power_max_w")
+        if self.ramp_w_per_s * STEP_S < self.power_min_w:
+            raise ValueError(
+                f"ramp_w_per_s must reach power_min_w, {self.power_min_w:g} W, in the {STEP_S:g} s "
+                "of a start"
+            )
         return self
 
 
@@ -264,6 +279,12 @@ class Vehicle(Section):
     def _check(self) -> Self:
         if not self.battery.soc_min <= self.trip.soc_init <= self.battery.soc_max:
             raise ValueError("trip.soc_init must lie between battery.soc_min and battery.soc_max")
+        most_j = CRANKING_SHARE * self.battery.power_discharge_max_w * STEP_S
+        if self.engine.start_energy_j > most_j:
+            raise ValueError(
+                f"engine.start_energy_j must be at most {most_j:g} J, {CRANKING_SHARE:.0%} of what "
+                f"battery.power_discharge_max_w gives in the {STEP_S:g} s of a start"
+            )
         return self
 
     def with_settings(self, settings: dict[str, object]) -> "Vehicle":

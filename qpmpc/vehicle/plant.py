@@ -13,14 +13,25 @@ from qpmpc.vehicle.parameters import Vehicle
 POWER_TOLERANCE_W = 1e-6
 BOILING_DEGC = 130.0  # half water, half glycol, at the overpressure of a usual cap, 1.1 bar
 EMPTY, FULL = 0.0, 1.0  # SOC
+LONG_AGO_S = 1_000_000  # as good as any time before; counts of seconds end here
 
 
 class PlantState(NamedTuple):
-    """State at the start of a step."""
+    """State at the start of a step.
+
+    Attributes
+    ----------
+    soc, t_cl_degc : of battery and coolant
+    engine_on : whether the engine ran in the last step
+    engine_for_s : whole seconds since it was started or stopped
+    p_eng_w : its power in the last step, 0 with the engine off
+    """
 
     soc: float
     t_cl_degc: float
     engine_on: bool = False
+    engine_for_s: int = LONG_AGO_S
+    p_eng_w: float = 0.0
 
 
 class Command(NamedTuple):
@@ -39,8 +50,9 @@ class Command(NamedTuple):
 class StepFlows(NamedTuple):
     """Every flow of one step, in W unless the name has another unit; the flows must balance.
 
-    `p_bat_w` is the battery's power at its terminals (discharge positive), `internal_w` the power
-    that leaves its store, `p_friction_w` that of the friction brakes (electrical side, positive),
+    `p_bat_w` is the battery's power at its terminals (discharge positive), `cranking_w` what of it
+    cranks the engine, `internal_w` the power that leaves its store, `p_friction_w` that of the
+    friction brakes (electrical side, positive),
     `p_missing_w` demand that neither engine nor battery can meet, `boiling_w` heat that leaves with
     the steam of boiling coolant. `power_excess_w` is the excess of the command over engine or
     battery power limits.
@@ -50,6 +62,7 @@ class StepFlows(NamedTuple):
     fuel_w: float
     p_eng_w: float
     p_bat_w: float
+    cranking_w: float
     internal_w: float
     p_friction_w: float
     p_missing_w: float
@@ -87,20 +100,22 @@ class Plant:
     ) -> tuple[PlantState, StepFlows]:
         """Advance one step.
 
-        dSOC/dt = -I / C_bat (eq. 1), P_bat = P_d + P_aux - P_eng (eq. 2),
+        dSOC/dt = -I / C_bat (eq. 1), P_bat = P_d + P_aux + P_crank - P_eng (eq. 2),
         M C dT/dt = Q_fuel - P_eng - Q_exh - Q_air - Q_rad - Q_heat (eq. 3),
         Q_fuel = LHV alpha(T) f_fuel(P_eng) (eqs. 4, 5), Q_exh = x (Q_fuel - P_eng).
 
         Braking power that the battery cannot take goes to the friction brakes; the battery takes
         less than its power limit where more would fill it beyond soc_max within the step. A
-        command beyond the engine's limits is clipped to them; power that clipping and the battery
-        leave uncovered is reported as `power_excess_w`. Whatever is asked, the states stay
+        command beyond the engine's limits, its ramp among them, is clipped to them; power that
+        clipping and the battery leave uncovered is reported as `power_excess_w`. A start cranks the
+        engine with the battery. Shortest runs and rests are not enforced: a controller may have
+        to break them to keep a limit. Whatever is asked, the states stay
         physical: the battery gives no more than it holds, the cabin takes no heat from coolant at
         ambient temperature, and coolant beyond `BOILING_DEGC` boils.
 
         Parameters
         ----------
-        state : SOC, coolant temperature, whether the engine ran in the last step
+        state : at the start of the step
         command : engine on or off and its power; power with the engine off counts as excess
         demand_w : P_d, negative when braking
         speed_mps : mean speed of the step
@@ -108,9 +123,12 @@ class Plant:
         vehicle = self.vehicle
         engine, battery, h = vehicle.engine, vehicle.battery, self.step_s
         on = command.engine_on
-        low, high = (engine.power_min_w, engine.power_max_w) if on else (0.0, 0.0)
+        started = on and not state.engine_on
+        ramped = (state.p_eng_w if state.engine_on else 0.0) + engine.ramp_w_per_s * h
+        low, high = (engine.power_min_w, min(engine.power_max_w, ramped)) if on else (0.0, 0.0)
         p_eng = min(max(command.p_eng_w, low), high)
-        p_bat = demand_w + battery.aux_power_w - p_eng
+        cranking = engine.start_energy_j / h if started else 0.0
+        p_bat = demand_w + battery.aux_power_w + cranking - p_eng
         friction = 0.0
         accepted = self.battery.charge_limit_w(state.soc, h)
         if p_bat < -accepted:
@@ -124,7 +142,6 @@ class Plant:
         wanted = p_bat
         p_bat = min(p_bat, self.battery.power_to_reach_w(state.soc, EMPTY, h))
         p_bat = max(p_bat, self.battery.power_to_reach_w(state.soc, FULL, h))
-        started = on and not state.engine_on
         fuel_g = 0.0
         if on:
             fuel_g = h * alpha_at(vehicle.cold_engine, state.t_cl_degc) * self.line.fuel.at(p_eng)
@@ -146,12 +163,15 @@ class Plant:
             min(max(state.soc - h * current / self.battery.charge_c, EMPTY), FULL),
             state.t_cl_degc + coolant / w_per_k,
             on,
+            min(state.engine_for_s + 1, LONG_AGO_S) if on == state.engine_on else 1,
+            p_eng,
         )
         flows = StepFlows(
             fuel_g=fuel_g,
             fuel_w=fuel_w,
             p_eng_w=p_eng,
             p_bat_w=p_bat,
+            cranking_w=cranking,
             internal_w=current * self.battery.open_circuit.at(state.soc),
             p_friction_w=friction,
             p_missing_w=wanted - p_bat,

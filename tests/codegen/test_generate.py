@@ -54,6 +54,22 @@ def test_settings_reach_the_code() -> None:
     assert ".rule_min_on_s = 9," in data
 
 
+def test_the_limits_of_the_engine_reach_the_code() -> None:
+    limits = {"start_energy_j": 3.5e3, "min_on_s": 12, "min_off_s": 2, "ramp_w_per_s": 9.5e3}
+    car = load_vehicle().with_settings({f"engine.{key}": value for key, value in limits.items()})
+    settings = ControllerSettings()
+    numbers = values_of(car, settings.mh_qp, settings.rule_based)
+    data = project_files(numbers, "host", "f64")["mpc_data.c"]
+    for line in (
+        ".start_energy_j = 3500.0,",
+        ".ramp_w_per_s = 9500.0,",
+        ".min_on_s = 12,",
+        ".min_off_s = 2,",
+        ".rule_min_on_s = 12,",  # the longer of the rules' own, 5 s, and the engine's
+    ):
+        assert line in data
+
+
 def test_constants_shared_with_python_are_defined_by_the_generator_alone() -> None:
     files = project_files(values(), "host", "f64")
     generated = files.pop("mpc_constants.h")
@@ -76,8 +92,9 @@ def test_no_path_or_date_of_this_machine_in_the_code() -> None:
 
 def test_single_precision_code_has_no_double_constant() -> None:
     data = project_files(values(), "host", "f32")["mpc_data.c"]
+    counts = {str(count) for count in values().counts.values()}
     numbers = [line.split("=")[1].strip(" ,;") for line in data.splitlines() if " = " in line]
-    numbers = [n for n in numbers if n[0] in "-0123456789" and n != str(values().min_on_s)]
+    numbers = [n for n in numbers if n[0] in "-0123456789" and n not in counts]
     assert len(numbers) > 40
     assert all(n.endswith("f") for n in numbers)
 

@@ -13,9 +13,19 @@ from qpmpc.vehicle import load_vehicle
 SHARED = ["bytes.c", "drive.c", "every_command.c"]
 STRICT = f"-std=c99 -O1 -g {SANITIZERS} -fno-sanitize-recover=all"
 SEED = "1"
-# An engine that has a least power and takes fuel to start shows more of the safety layer; few
-# iterations leave the time to the seconds. Departures of four slices are finished by some trips.
-VEHICLE = load_vehicle().with_settings({"engine.start_fuel_g": 0.3, "engine.power_min_w": 2e3})
+# An engine that has a least power, a ramp, shortest runs and rests, and takes fuel and current to
+# start shows more of the safety layer; few iterations leave the time to the seconds. Departures of
+# four slices are finished by some trips.
+VEHICLE = load_vehicle().with_settings(
+    {
+        "engine.start_fuel_g": 0.3,
+        "engine.start_energy_j": 5e3,
+        "engine.power_min_w": 2e3,
+        "engine.ramp_w_per_s": 8e3,
+        "engine.min_on_s": 4,
+        "engine.min_off_s": 3,
+    }
+)
 SETTINGS: dict[str, object] = {"mh_qp.admm.iterations": 10, "mh_qp.admm.cold_iterations": 15}
 
 

@@ -38,6 +38,10 @@ def test_a_vehicle_file_loads_like_the_shipped_one(tmp_path):
         ("mass_kg = 1530.9", "mass_kg = nan", "chassis.mass_kg"),
         ("mass_kg = 1530.9", "weight_kg = 1530.9", "weight_kg"),
         ("soc_min = 0.4 ", "soc_min = 0.9 ", "soc_min"),
+        ("start_energy_j = 0.0", "start_energy_j = 13501.0", "engine.start_energy_j"),
+        ("min_on_s = 0 ", "min_on_s = 4.5 ", "engine.min_on_s"),
+        ("min_off_s = 0 ", "min_off_s = 601 ", "engine.min_off_s"),
+        ("ramp_w_per_s = 1.0e6", "ramp_w_per_s = 0.0", "engine.ramp_w_per_s"),
         ("soc_init = 0.6", "soc_init = 0.95", "soc_init"),
         ("power_discharge_max_w = 27000.0", "power_discharge_max_w = 60000.0", "power_discharge"),
         ("torque_speed_rpm = [1000,", "torque_speed_rpm = [9000,", "torque_speed_rpm"),
@@ -56,6 +60,21 @@ def test_bad_values_are_named_in_one_line(tmp_path, old, new, named):
     assert named in str(caught.value)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_file_without_limits_of_starts_has_none(tmp_path):
+    path = tmp_path / "older.toml"
+    keys = ("start_energy_j", "min_on_s", "min_off_s", "ramp_w_per_s")
+    path.write_text("".join(x for x in _text().splitlines(True) if not x.startswith(keys)))
+    engine = load_vehicle(path).engine
+    free = (0.0, 0, 0, 1e6)
+    assert (engine.start_energy_j, engine.min_on_s, engine.min_off_s, engine.ramp_w_per_s) == free
+
+
+def test_an_engine_reaches_its_least_power_in_the_second_of_a_start():
+    load_vehicle().with_settings({"engine.power_min_w": 2e3, "engine.ramp_w_per_s": 2e3})
+    with pytest.raises(InputError, match="ramp_w_per_s must reach power_min_w, 2000 W"):
+        load_vehicle().with_settings({"engine.power_min_w": 2e3, "engine.ramp_w_per_s": 1999})
 
 
 def test_missing_files_and_unknown_names_say_what_is_allowed(tmp_path):

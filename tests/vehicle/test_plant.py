@@ -9,13 +9,19 @@ from hypothesis import strategies as st
 
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.vehicle import Command, Plant, PlantState, demand_w, load_vehicle
-from qpmpc.vehicle.plant import BOILING_DEGC
+from qpmpc.vehicle.plant import BOILING_DEGC, LONG_AGO_S
 
 PLANT = Plant(load_vehicle())
+STARTING = Plant(
+    load_vehicle().with_settings(
+        {"engine.start_fuel_g": 0.2, "engine.start_energy_j": 3.5e3, "engine.ramp_w_per_s": 9.5e3}
+    )
+)
 BALANCE = 1e-9  # relative to the power turned over in the step, as promised in the docs
 
 
 @given(
+    plant=st.sampled_from([PLANT, STARTING]),
     soc=st.floats(0.0, 1.0),
     t_cl_degc=st.floats(-20.0, 135.0),
     on=st.booleans(),
@@ -23,16 +29,17 @@ BALANCE = 1e-9  # relative to the power turned over in the step, as promised in 
     demand=st.floats(-150e3, 200e3),
     speed_mps=st.floats(0.0, 40.0),
 )
-def test_energy_is_conserved_in_every_step(soc, t_cl_degc, on, p_eng_w, demand, speed_mps):
+def test_energy_is_conserved_in_every_step(plant, soc, t_cl_degc, on, p_eng_w, demand, speed_mps):
     state = PlantState(soc, t_cl_degc)
-    after, f = PLANT.step(state, Command(on, p_eng_w if on else 0.0), demand, speed_mps)
+    after, f = plant.step(state, Command(on, p_eng_w if on else 0.0), demand, speed_mps)
     battery, thermal = PLANT.vehicle.battery, PLANT.vehicle.thermal
+    assert f.cranking_w == (plant.vehicle.engine.start_energy_j if on else 0.0)
     current = f.internal_w / PLANT.battery.open_circuit.at(soc)
     resistance = (PLANT.battery.discharge if f.p_bat_w >= 0 else PLANT.battery.charge).at(soc)
     joule_w = resistance * current**2
     stored_w = thermal.heat_capacity_j_per_k * (after.t_cl_degc - t_cl_degc)
     chemical_w = f.fuel_w + f.internal_w
-    work_w = demand + battery.aux_power_w + f.p_friction_w - f.p_missing_w
+    work_w = demand + battery.aux_power_w + f.cranking_w + f.p_friction_w - f.p_missing_w
     lost_w = f.exhaust_w + f.air_w + f.radiator_w + f.cabin_w + f.boiling_w
     heat_w = joule_w + lost_w + stored_w
     turnover = abs(f.fuel_w) + abs(f.internal_w) + abs(demand) + 1e3
@@ -125,6 +132,47 @@ def test_start_fuel_is_charged_once_a_start():
     )
     assert a.fuel_g - b.fuel_g == pytest.approx(0.5)
     assert (a.started, b.started) == (True, False)
+
+
+def test_cranking_takes_its_energy_from_the_battery_in_the_second_of_a_start_only():
+    _, still = STARTING.step(PlantState(0.6, 50.0), Command(False, 0.0), 5e3, 5.0)
+    first, start = STARTING.step(PlantState(0.6, 50.0), Command(True, 5e3), 5e3, 5.0)
+    _, after = STARTING.step(first, Command(True, 5e3), 5e3, 5.0)
+    assert [f.cranking_w for f in (still, start, after)] == [0.0, 3.5e3, 0.0]
+    assert start.p_bat_w == pytest.approx(400.0 + 3.5e3)
+    assert after.p_bat_w == pytest.approx(400.0)
+
+
+def test_while_braking_cranking_takes_what_the_brakes_would_have_taken():
+    # 30 kW of braking, 25 kW at most into the battery: the brakes take the rest
+    _, still = STARTING.step(PlantState(0.6, 50.0), Command(False, 0.0), -30e3, 15.0)
+    _, start = STARTING.step(PlantState(0.6, 50.0), Command(True, 0.0), -30e3, 15.0)
+    assert still.p_friction_w == pytest.approx(30e3 - 400.0 - 25e3)
+    assert start.p_friction_w == pytest.approx(30e3 - 400.0 - 25e3 - 3.5e3)
+    assert start.p_bat_w == still.p_bat_w == pytest.approx(-25e3)
+
+
+def test_power_rises_no_faster_than_the_ramp_and_falls_at_once():
+    state, powers, excess = PlantState(0.6, 60.0), [], []
+    for wanted_w in (20e3, 20e3, 20e3, 2e3, 20e3):
+        state, f = STARTING.step(state, Command(True, wanted_w), 20e3, 20.0)
+        powers.append(f.p_eng_w)
+        excess.append(f.power_excess_w)
+        assert state.p_eng_w == f.p_eng_w
+    assert powers == pytest.approx([9.5e3, 19e3, 20e3, 2e3, 11.5e3])
+    assert excess == pytest.approx([10.5e3, 1e3, 0.0, 0.0, 8.5e3])
+    stopped, _ = STARTING.step(state, Command(False, 0.0), 5e3, 20.0)
+    _, again = STARTING.step(stopped, Command(True, 20e3), 5e3, 20.0)
+    assert (stopped.p_eng_w, again.p_eng_w) == (0.0, 9.5e3)  # from 0 again
+
+
+def test_the_plant_counts_the_seconds_since_the_engine_started_or_stopped():
+    state, counts = PLANT.initial_state(), []
+    assert state.engine_for_s == LONG_AGO_S  # nothing holds it at departure
+    for on in (False, True, True, True, False, False, True):
+        state, _ = PLANT.step(state, Command(on, 0.0), 0.0, 0.0)
+        counts.append(state.engine_for_s)
+    assert counts == [LONG_AGO_S, 1, 2, 3, 1, 2, 1]
 
 
 def test_demand_at_constant_speed_is_the_road_load():

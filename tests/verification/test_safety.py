@@ -3,15 +3,24 @@
 import numpy as np
 
 from qpmpc.trip import Trip
+from qpmpc.vehicle import load_vehicle
 from qpmpc.verification.checks.safety_checks import FULL_CARS, SEED
 from qpmpc.verification.safety.hostile import hostile_drive
 from qpmpc.verification.safety.seconds import random_vehicle
 
 STEPS = 700
+LIMITS = {
+    "engine.start_fuel_g": 0.2,
+    "engine.start_energy_j": 3.5e3,
+    "engine.min_on_s": 4,
+    "engine.min_off_s": 2,
+    "engine.ramp_w_per_s": 9.5e3,
+}
 
 
 def test_hostile_seconds_c_and_python_agree_and_nothing_avoidable_happens() -> None:
-    found = hostile_drive(Trip("nycc", "prius-liion"), STEPS, seed=5)
+    car = load_vehicle("prius-liion").with_settings(LIMITS)
+    found = hostile_drive(Trip("nycc", car), STEPS, seed=5)
     assert found.faults == []
     assert max(found.avoidable) <= 1e-6
     assert found.steps == STEPS

@@ -26,15 +26,19 @@ def _imbalances(run: Run, cycle: Cycle) -> dict[str, tuple[Floats, Floats]]:
     grid = np.arange(0.0, engine.power_max_w + TABLE_STEP_W, TABLE_STEP_W)
     grid = np.unique(grid.clip(max=engine.power_max_w))
     burnt = np.interp(tr.p_eng_w, grid, eq.fuel_g_per_s(grid)) * eq.alpha(t) * tr.engine_on
+    begins = np.diff(tr.engine_on.astype(float), prepend=0.0) > 0.0
     speed = 0.5 * (cycle.speed_mps[1:] + cycle.speed_mps[:-1])
     heat = (1.0 - th.exhaust_share) * (tr.fuel_g * eq.lhv_j_per_g - tr.p_eng_w)
     lost = eq.ua_w_per_k(speed) * (t - th.t_amb_degc) + eq.cabin_w(t) + eq.radiator_w(t)
     stored = np.diff(tr.t_cl_degc) * th.heat_capacity_j_per_k
     return {
-        "power, eq. (2)": (tr.p_eng_w + tr.p_bat_w, net + tr.p_friction_w),
+        "power, eq. (2)": (
+            tr.p_eng_w + tr.p_bat_w,
+            net + tr.p_friction_w + begins * engine.start_energy_j,
+        ),
         "charge, eq. (1)": (eq.terminal_w(soc, current), tr.p_bat_w),
         "heat, eq. (3)": (stored, heat - lost),
-        "fuel, eqs. (4, 5)": (tr.fuel_g, burnt),
+        "fuel, eqs. (4, 5)": (tr.fuel_g, burnt + begins * engine.start_fuel_g),
     }
 
 
@@ -65,6 +69,7 @@ def limits_kept(context: Context) -> Iterator[Check]:
                 tr.p_bat_w, -battery.power_charge_max_w, battery.power_discharge_max_w
             ),
             "engine, W": _beyond(tr.p_eng_w, 0.0, engine.power_max_w),
+            "its ramp, W": _beyond(np.diff(tr.p_eng_w, prepend=0.0), -np.inf, engine.ramp_w_per_s),
         }
         worst = max(excess, key=lambda name: excess[name])
         yield Check(

@@ -200,7 +200,10 @@ def _twice(vehicle: Vehicle) -> tuple[Vehicle, ControllerSettings]:
         "chassis": (
             "mass_kg", "road_load_a_n", "road_load_b_n_per_mps", "road_load_c_n_per_mps2"
         ),
-        "engine": ("displacement_l", "power_max_w", "power_min_w", "torque_max_nm"),
+        "engine": (
+            "displacement_l", "power_max_w", "power_min_w", "torque_max_nm",
+            "start_fuel_g", "start_energy_j", "ramp_w_per_s",
+        ),
         "thermal": (
             "heat_capacity_j_per_k", "ua0_w_per_k", "ua1_w_per_k_per_mps",
             "radiator_w_per_k", "cabin_heat_w",

@@ -30,3 +30,19 @@ def no_command_is_safer(context: Context) -> Iterator[Check]:
             unit,
             detail,
         )
+    yield Check(
+        "Safety layer, range",
+        "No command asks for more power than the engine and its ramp allow.",
+        ROUNDING_W,
+        found.beyond_w,
+        "W",
+        detail,
+    )
+    yield Check(
+        "Safety layer, shortest run and rest",
+        "No run or rest of the engine ends too early where going on keeps all limits and margins.",
+        0.0,
+        float(found.cut_short),
+        "seconds",
+        f"{found.held} seconds in which ending it was wished",
+    )

@@ -31,7 +31,7 @@ class Hostile:
     steps, planned : seconds, and those with a new plan
     flags, rungs : how often each was seen
     faults : seconds in which something that must hold did not, with the reason
-    avoidable : largest excess beyond the best command, in seconds with true measurements
+    avoidable : largest excess beyond the best command, in seconds with true measurements and clock
     """
 
     steps: int = 0
@@ -97,8 +97,9 @@ def hostile_drive(trip: Trip, steps: int, seed: int) -> Hostile:
         reason = _disagreement(mine, its, trip.vehicle)
         if reason:
             found.faults.append(f"second {k}: {reason}: {told}, {mine}, {its}")
-        if told[1:] == seen[1:] and not mine.flags & Flag.BAD_MEASUREMENT:
-            true.append(seen)
+        if told[1:] == seen[1:] and not mine.flags & (Flag.BAD_MEASUREMENT | Flag.BAD_CLOCK):
+            for_s, power_w = state.engine_for_s, state.p_eng_w
+            true.append(seen._replace(engine_for_s=for_s, p_eng_before_w=power_w))
             commands.append(mine.command)
         state, _ = trip.plant.step(state, mine.command, seen.demand_w, seen.speed_mps)
     found.avoidable = _avoidable(trip.vehicle, true, commands)

@@ -20,15 +20,22 @@ class Promise:
     Attributes
     ----------
     seconds, kept : tried, and those of them in which every limit is kept
+    beyond_w : largest engine power of a command beyond what the engine or its ramp allows
     power_w, soc, t_cl_k : largest excess beyond that of the best command of the grid, in order of
         priority
+    held : seconds within a shortest run or rest whose wish was to end it
+    cut_short : those of them in which it ended although going on would have kept all limits, with
+        twice the margins of the layer
     """
 
     seconds: int = 0
     kept: int = 0
+    beyond_w: float = 0.0
     power_w: float = 0.0
     soc: float = 0.0
     t_cl_k: float = 0.0
+    held: int = 0
+    cut_short: int = 0
 
 
 def promise(cars: int, seed: int) -> Promise:
@@ -44,26 +51,40 @@ def promise(cars: int, seed: int) -> Promise:
         vehicle = random_vehicle(rng)
         at = random_seconds(vehicle, SECONDS_A_CAR, rng)
         every = EveryCommand(vehicle)
-        excess = every.of(at, _commands(vehicle, at, rng))
+        wishes = _wishes(len(at.soc), rng)
+        commands = _commands(vehicle, at, wishes)
+        excess = every.of(at, commands)
         least = every.least(at, excess)
         found.seconds += SECONDS_A_CAR
         found.kept += int(sum(not any(second) for second in zip(*excess, strict=True)))
+        powers_w = np.array([command.p_eng_w for command in commands])
+        found.beyond_w = max(found.beyond_w, float((powers_w - every.greatest_w(at)).max()))
         found.power_w = max(found.power_w, float((excess.power_w - least.power_w).max()))
         found.soc = max(found.soc, float((excess.soc - least.soc).max()))
         found.t_cl_k = max(found.t_cl_k, float((excess.t_cl_k - least.t_cl_k).max()))
+        is_on, engine = at.engine_on > 0.0, vehicle.engine
+        is_held = at.engine_for_s < np.where(is_on, engine.min_on_s, engine.min_off_s)
+        is_held &= np.array([w.engine_on for w in wishes]) != is_on
+        ended = np.array([c.engine_on for c in commands]) != is_on
+        found.held += int(is_held.sum())
+        found.cut_short += int((is_held & ended & every.could_go_on(at)).sum())
     return found
 
 
-def _commands(vehicle: Vehicle, at: Seconds, rng: np.random.Generator) -> list[Command]:
-    """The layer's commands for random wishes, of numbers that are none too."""
-    layer = SafetyLayer(Plant(vehicle))
-    count = len(at.soc)
+def _wishes(count: int, rng: np.random.Generator) -> list[Command]:
+    """Random wishes, of numbers that are none too."""
     on = rng.integers(0, 2, count)
     power = rng.choice([0.0, np.nan, np.inf, -5e3], count)
     power = np.where(rng.random(count) < 0.7, rng.uniform(0.0, 1e5, count), power)
+    return [Command(bool(on[i]), float(power[i])) for i in range(count)]
+
+
+def _commands(vehicle: Vehicle, at: Seconds, wishes: list[Command]) -> list[Command]:
+    """The layer's commands."""
+    layer = SafetyLayer(Plant(vehicle))
     return [
         layer.admissible(
-            Command(bool(on[i]), float(power[i])),
+            wish,
             Observation(
                 0,
                 float(at.soc[i]),
@@ -71,7 +92,9 @@ def _commands(vehicle: Vehicle, at: Seconds, rng: np.random.Generator) -> list[C
                 bool(at.engine_on[i]),
                 float(at.demand_w[i]),
                 float(at.speed_mps[i]),
+                int(at.engine_for_s[i]),
+                float(at.p_eng_before_w[i]),
             ),
         )
-        for i in range(count)
+        for i, wish in enumerate(wishes)
     ]

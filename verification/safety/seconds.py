@@ -31,6 +31,10 @@ def _drawn(rng: np.random.Generator) -> Vehicle:
             "battery.aux_power_w": rng.uniform(0.0, 2000.0),
             "engine.power_min_w": float(rng.choice([0.0, 2000.0])),
             "engine.start_fuel_g": float(rng.choice([0.0, 0.3])),
+            "engine.start_energy_j": float(rng.choice([0.0, 5e3])),
+            "engine.ramp_w_per_s": float(rng.choice([8e3, 1e6])),
+            "engine.min_on_s": int(rng.choice([0, 4])),
+            "engine.min_off_s": int(rng.choice([0, 3])),
         }
     )
 
@@ -43,12 +47,15 @@ def random_seconds(vehicle: Vehicle, count: int, rng: np.random.Generator) -> Se
     most_w = battery.power_discharge_max_w + vehicle.engine.power_max_w
     wide_w = rng.uniform(-1.3 * most_w, 1.3 * most_w, count)
     narrow_w = rng.normal(0.0, 3e3, count)
+    running = rng.integers(0, 2, count).astype(float)
     return Seconds(
         soc=soc,
         t_cl_degc=t_cl,
-        engine_on=rng.integers(0, 2, count).astype(float),
+        engine_on=running,
         demand_w=np.where(rng.random(count) < 0.5, wide_w, narrow_w),
         speed_mps=rng.uniform(0.0, 45.0, count),
+        engine_for_s=rng.integers(1, 8, count).astype(float),
+        p_eng_before_w=running * rng.uniform(0.0, vehicle.engine.power_max_w, count),
     )
 
 
