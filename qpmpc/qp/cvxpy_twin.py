@@ -139,8 +139,8 @@ class CvxpyTwin:
         soc: float,
         t_cl_degc: float,
         about: Linearisation,
-        scaling: Scaling | None = None,
         engine_on: bool = False,
+        scaling: Scaling | None = None,
     ) -> None:
         """Set the parameters for a horizon, a state and a linearisation point.
 
@@ -149,9 +149,9 @@ class CvxpyTwin:
         stages : the trip ahead, n stages
         soc, t_cl_degc : state at the start of the horizon
         about : linearisation point
+        engine_on : whether the engine runs now; read where starts cost something
         scaling : the regularisation of `StageQp` is defined in its solver units; with its scaling
             it is the same here, without it is zero
-        engine_on : whether the engine runs now; read where starts cost something
         """
         state = {Var.SOC: soc, Var.T_CL: t_cl_degc, Var.ON: 0.0}  # on: in the bound
         for var, now in self._now.items():

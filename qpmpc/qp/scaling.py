@@ -28,7 +28,7 @@ class ScalingSettings(BaseModel):
     fuel_g_per_s: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0
     energy_j: Annotated[float, Field(ge=40.0, le=40e6)] = 40e3
     t_cl_k: Annotated[float, Field(ge=1e-3, le=1e3)] = 2.0
-    starts: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0
+    starts: Annotated[float, Field(ge=1e-3, le=1e3)] = 0.2
     duration_exponent: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
 
 

@@ -34,7 +34,7 @@ class RelaxedTrip:
 
     Attributes
     ----------
-    fuel_g : sum h alpha(T) F
+    fuel_g : sum h alpha(T) F, and the fuel of starts
     integral_share : share of seconds whose on-share is within 0.02 of 0 or 1
     rounds : linearisations until the fuel converged
     """
@@ -79,6 +79,8 @@ def relaxed_trip(cycle: Cycle, vehicle: Vehicle) -> RelaxedTrip:
         ends = x[:, Var.T_CL]
         mean = 0.5 * (ends + np.concatenate([[start], ends[:-1]]))
         last, fuel_g = fuel_g, float(np.sum(stages.duration_s * under.alpha(mean) * x[:, Var.FUEL]))
+        if qp.table.start_fuel:
+            fuel_g += vehicle.engine.start_fuel_g * float(x[:, Var.START].sum())
         if abs(fuel_g - last) < CONVERGED_G:
             on = x[:, Var.ON]
             integral = float(np.mean((on < INTEGRAL) | (on > 1.0 - INTEGRAL)))
