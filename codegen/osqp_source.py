@@ -12,7 +12,6 @@ import scipy.sparse as sp
 
 from qpmpc.codegen.values import Values
 from qpmpc.errors import InputError
-from qpmpc.qp.rows import Rows
 from qpmpc.qp.structure import QpStructure
 from qpmpc.solvers.osqp import SAME_WORK
 

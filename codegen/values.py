@@ -41,7 +41,7 @@ CONSTANTS: dict[str, dict[str, float]] = {
         (checked, "LONGEST_STAGE_S NEWS"),
         (stage_qp, "LEAST_COST"),
         (coolant_floor, "USABLE"),
-        (rows, "SHORTEST_SCALE_S REACH_MARGIN_SOC ACCURATE_STAGE_S SIGMA_FORCED MOOT_G_PER_S"),
+        (rows, "SHORTEST_SCALE_S ACCURATE_STAGE_S SIGMA_FORCED MOOT_G_PER_S"),
         (base, "LARGEST_PLAUSIBLE"),
         (demand, "GRAVITY_MPS2"),
     )

@@ -104,7 +104,7 @@ class StageBuilder:
             self._demand_w[now : now + n],
             self._speed_mps[now : now + n],
             min(n, self.steps - now),
-            Stages(*fields, rises.T.ravel()),
+            Stages(*np.vstack([fields, rises.T.ravel()])),
         )
 
     def at(self, step: int) -> Stages:
@@ -122,7 +122,7 @@ class StageBuilder:
         rises = np.zeros(self.count)
         rises[:seen] = 1.0
         rises[n:] = starts_per_rise(long.rises, self.settings)
-        return Stages(*fields, rises)
+        return Stages(*np.vstack([fields, rises]))
 
     def _long_start(self, step: int) -> NDArray[np.intp]:
         """First second of each block beyond the short horizon; its end where there is none."""

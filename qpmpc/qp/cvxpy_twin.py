@@ -68,15 +68,16 @@ class CvxpyTwin:
         numbers = qp_parameters(vehicle, model, self.settings, ScalingSettings())
         self._quantities = Quantities(numbers, vehicle, model, stages)
         self._parameters: list[tuple[Any, CodeType, int]] = []
-        self.variables = {var: cp.Variable(stages, name=var.name.lower()) for var in self.table.variables}
+        names = {var: var.name.lower() for var in self.table.variables}
+        self.variables = {var: cp.Variable(stages, name=name) for var, name in names.items()}
         x = {var: UNIT[var] * variable for var, variable in self.variables.items()}
         self.soc, self.t_cl_degc = x[Var.SOC], x[Var.T_CL]
         self.p_eng_w, self.on = x[Var.P_ENG], x[Var.ON]
         self.fuel_g_per_s, self.internal_w = x[Var.FUEL], x[Var.INTERNAL]
         self.t_slack_k = x[Var.T_SLACK]
         # the state now is a variable with one value, as products of parameters are not DPP
-        start = {state: cp.Variable(1, name=f"{state.name.lower()}_now") for state in self.table.coupling}
-        self._now = {state: cp.Parameter(name=f"{state.name.lower()}_given") for state in start}
+        start = {var: cp.Variable(1, name=f"{names[var]}_now") for var in self.table.coupling}
+        self._now = {var: cp.Parameter(name=f"{names[var]}_given") for var in start}
         self._x: dict[Entry, Any] = {Entry(var, False): x[var] for var in x}
         for state, known in start.items():
             self._x[Entry(state, True)] = cp.hstack([UNIT[state] * known, x[state][:-1]])

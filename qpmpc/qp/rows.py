@@ -24,7 +24,6 @@ from qpmpc.qp.expressions import FormulaError, expression, terms_of
 from qpmpc.vehicle.parameters import Engine
 
 SHORTEST_SCALE_S = 1.0  # a masked stage is scaled as one of 1 s
-REACH_MARGIN_SOC = 1e-5
 ACCURATE_STAGE_S = 1.0  # a stage of this length or less is known, a longer one is forecast
 MOOT_G_PER_S = 5.0  # a bound on fuel that is never met
 SIGMA_FORCED = 0.99  # "engine must be on" as a lower bound on sigma, kept apart from the upper one
@@ -73,7 +72,7 @@ waste_g_per_s = where(highest_floor_degc > t_min_degc, 0.0, MOOT_G_PER_S)
 # the way leads to: a limit above that is moot
 strongest_w = max(net_w - engine_max_w, -battery_charge_max_w)
 spent_soc = running(duration_s * pwa_battery(strongest_w) / battery_energy_j)
-reach_soc = start_soc - spent_soc - REACH_MARGIN_SOC
+reach_soc = start_soc - spent_soc - reach_margin_soc
 limit_soc = soc_min + where(duration_s > ACCURATE_STAGE_S, soc_reserve, 0.0)
 last_low_soc = where(soc_penalty_g > 0.0, limit_soc, terminal_soc_low)
 last_high_soc = where(soc_penalty_g > 0.0, soc_max, terminal_soc_high)

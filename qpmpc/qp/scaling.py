@@ -15,8 +15,8 @@ class ScalingSettings(BaseModel):
 
     Attributes
     ----------
-    power_w, fuel_g_per_s, t_cl_k, starts : one solver unit of each quantity; within a factor of some
-        thousand of its size, beyond which no solver converges
+    power_w, fuel_g_per_s, t_cl_k, starts : one solver unit of each quantity; within a factor of
+        some thousand of its size, beyond which no solver converges
     energy_j : one solver unit of SOC, as battery energy
     duration_exponent : a stage's rates are counted in units / h^exponent, so that a long stage's
         variables, which weigh more, are resolved finer; 1 makes them energies, 0 plain rates

@@ -22,6 +22,7 @@ from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
 
+REACH_MARGIN_SOC = 1e-5
 T_CL_MAX_MARGIN_K = 0.05  # small: the radiator is fully open only at the limit itself
 LEAST_COST = 1e-9  # of any fuel entry: where all stages are masked the cost is scaled by this
 
@@ -93,6 +94,7 @@ def qp_parameters(
             f"soc_max={battery.soc_max:g}, leave no terminal SOC: {soc_low:g} is above "
             f"{soc_high:g}"
         )
+    crank_j = cranking_j(vehicle, model)
     # the chord of the fuel curve, from idling to full power
     idle, full = (
         float((model.fuel.slope * power + model.fuel.intercept).max())
@@ -103,7 +105,7 @@ def qp_parameters(
         "engine_min_w": engine.power_min_w,
         "lhv_j_per_g": engine.lhv_j_per_g,
         "start_fuel_g": engine.start_fuel_g,
-        "cranking_j": cranking_j(vehicle, model),
+        "cranking_j": crank_j,
         "fuel_idle_g_per_s": idle,
         "fuel_chord_g_per_j": (full - idle) / engine.power_max_w,
         **{name: float(value) for name, value in thermal.model_dump().items()},
@@ -115,6 +117,7 @@ def qp_parameters(
         "soc_init": trip.soc_init,
         # of stages of more than 1 s, above soc_min
         "soc_reserve": settings.soc_reserve * max(trip.soc_init - battery.soc_min, 0.0),
+        "reach_margin_soc": REACH_MARGIN_SOC + crank_j / model.battery_energy_j,
         "terminal_soc_low": soc_low,
         "terminal_soc_high": soc_high,
         "soc_penalty_g": settings.soc_penalty_g,

@@ -337,7 +337,7 @@ def stage_program(
             low = max(qp.terminal_low * vehicle.trip.soc_init, battery.soc_min)
             high = min(qp.terminal_high * vehicle.trip.soc_init, high)
         rows.add("SOC max", high, {at[SOC]: 1.0})
-        rows.add("SOC min", -min(low, reach - 1e-5), {at[SOC]: -1.0})
+        rows.add("SOC min", -min(low, reach - 1e-5 - crank_j / energy), {at[SOC]: -1.0})
         rows.add("coolant min", -float(floor[k]), {at[T_CL]: -1.0, at[T_SLACK]: -1.0})
         rows.add("coolant max", th.t_cl_max_degc - 0.05, {at[T_CL]: 1.0, at[T_SLACK]: -1.0})
         rows.add("slack", 0.0, {at[T_SLACK]: -1.0})
