@@ -25,7 +25,7 @@ from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.errors import InputError
 from qpmpc.preview import StageBuilder
-from qpmpc.preview.stages import Preview, Stages
+from qpmpc.preview.stages import Preview
 from qpmpc.registry import make_controller
 from qpmpc.simulation import simulate
 from qpmpc.solvers import base
@@ -298,7 +298,12 @@ def far_more_of_the_same(preview: Preview) -> Preview:
     long = preview.long
     full = np.full_like(long.net_w, VEHICLE.engine.power_max_w)
     return preview._replace(
-        long=Stages(np.full_like(full, 1e5), full, long.speed_mps, np.full_like(full, 2e4), long.rises)
+        long=replace(
+            long,
+            duration_s=np.full_like(full, 1e5),
+            net_w=full,
+            internal_off_w=np.full_like(full, 2e4),
+        )
     )
 
 

@@ -81,7 +81,8 @@ def test_masked_stages_pass_the_state_on_at_no_cost():
         assert q[k * qp.structure.variables + Var.FUEL] == 0.0
         row = a[k * qp.rows.count + qp.rows.first("soc")]
         expected = np.zeros_like(row)
-        expected[k * qp.structure.variables + Var.SOC], expected[(k - 1) * qp.structure.variables + Var.SOC] = 1.0, -1.0
+        here = k * qp.structure.variables + Var.SOC
+        expected[here], expected[here - qp.structure.variables] = 1.0, -1.0
         np.testing.assert_allclose(row, expected, atol=1e-12)
 
 

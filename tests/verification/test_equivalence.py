@@ -168,7 +168,7 @@ def test_twin_plans_as_the_product_does_without_regularisation() -> None:
     inputs = renderings.inputs(cases[0])
     renderings.twin.update(*inputs)
     x = renderings.twin.solve()
-    assert x.shape == (renderings.qp.stages, len(Var))
+    assert x.shape == (renderings.qp.stages, len(renderings.qp.table.variables))
     counts = inputs[0].duration_s > 0.0
     assert np.all(x[counts, Var.ON] < 1.0 + 1e-6)
     assert np.all(x[counts, Var.ON] > -1e-6)
