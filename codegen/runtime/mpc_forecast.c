@@ -43,12 +43,13 @@ static void count(mpc_forecast *forecast, int32_t second, int32_t times)
     const mpc_real demand_w = forecast->trip.demand_w[second];
     const mpc_real net_w = battery_side_w(demand_w);
     mpc_class_sums *const block = &forecast->ahead[(second / forecast->block_s) * MPC_CLASSES];
-    const int32_t now = class_of(demand_w);
-    const int32_t before =
-        (second > 0) ? class_of(forecast->trip.demand_w[second - 1]) : (MPC_CLASSES - 1);
-    mpc_class_sums *const to = &block[now];
+    const int32_t of_class = class_of(demand_w);
+    mpc_class_sums *const to = &block[of_class];
     const mpc_real sign = (mpc_real)times;
-    for (int32_t i = now; i < before; i++) {
+    /* departure is from the lowest class */
+    const int32_t from = (second > 0) ? class_of(forecast->trip.demand_w[second - 1])
+                                      : (MPC_CLASSES - 1);
+    for (int32_t i = of_class; i < from; i++) {
         block[i].rises += times;
     }
     to->seconds += times;

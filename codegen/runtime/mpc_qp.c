@@ -31,8 +31,8 @@ void mpc_qp_road(mpc_state *state, const mpc_in *in)
         stage->road.speed_mps = in->long_speed_mps[k];
         stage->road.internal_off_w = in->long_internal_off_w[k];
         /* what rises into a class, falls from it to the next stage, the class below */
-        stage->road.rises =
-            ((k % MPC_CLASSES) > 0) ? (-mpc_par.rise_share * in->long_rises[k - 1]) : REAL(0.0);
+        stage->road.rises = ((k % MPC_CLASSES) > 0) ? (-mpc_par.rise_share * in->long_rises[k - 1])
+                                                    : REAL(0.0);
     }
 }
 

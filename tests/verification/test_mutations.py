@@ -166,7 +166,8 @@ MUTATIONS = [
     # QP
     Mutation(
         "state of two stages before", QpStructure, "__init__",
-        "(k - self.entry_before) * VARS", "(k - 2 * self.entry_before) * VARS", QP,
+        "(k - self.entry_before) * self.variables",
+        "(k - 2 * self.entry_before) * self.variables", QP,
     ),
     Mutation(
         "alpha' = 0", rows, "QUANTITIES",
