@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from qpmpc.controllers.base import Decision
 from qpmpc.controllers.monitor import Flag
+from qpmpc.engine_runs import run_figures
 from qpmpc.limits import Excess, excess_of, sentence
 from qpmpc.vehicle.battery import BatteryMaps
-from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.vehicle.parameters import STEP_S, Vehicle
 from qpmpc.vehicle.plant import PlantState, StepFlows
 
 Floats = NDArray[np.float64]
@@ -201,6 +202,8 @@ class Run:
                 *(f"{self.controller} on {self.cycle}: not comparable: {why}" for why in reasons),
             ],
             "flags": flag_seconds(tr.flags),
+            **run_figures(self.vehicle.engine, tr.engine_on, self.distance_km),
+            "friction_brake_j": float(tr.p_friction_w.sum()) * STEP_S,
             **({} if self.faults is None else {"faults": self.faults}),
         }
 

@@ -4,7 +4,7 @@
  * the limits by less: first battery and engine power, then SOC, then coolant; where all are kept,
  * in the same order the limits drawn in by a margin. Of such commands it takes the one nearest to
  * the wish: the same on or off where possible, then the nearest power. While the shortest run or
- * rest of the engine is not over, the wish is that it goes on.
+ * rest of the engine is not over, the wish is that it goes on as it does.
  */
 #include "mpc_constants.h"
 #include "mpc_heat.h"
@@ -57,11 +57,20 @@ static interval of_engine(const mpc_measured *seen)
     return allowed;
 }
 
-/* Whether the engine is wished on; as it is while its shortest run or rest lasts. */
-static int32_t goes_on(mpc_command wish, const mpc_measured *seen)
+/* Engine on or off, and its power if on; as before while its shortest run or rest lasts. */
+static mpc_command lasting(mpc_command wish, const mpc_measured *seen)
 {
     const int32_t shortest_s = (seen->engine_on != 0) ? mpc_par.min_on_s : mpc_par.min_off_s;
-    return (seen->engine_for_s < shortest_s) ? seen->engine_on : wish.engine_on;
+    const int32_t lasts = (seen->engine_for_s < shortest_s) ? 1 : 0;
+    mpc_command result = {REAL(0.0), (lasts != 0) ? seen->engine_on : wish.engine_on};
+    if (wish.engine_on != 0) {
+        result.p_eng_w = (wish.p_eng_w >= REAL(0.0)) ? wish.p_eng_w : REAL(0.0); /* nor NaN */
+    } else if ((result.engine_on != 0) && (seen->p_eng_before_w < mpc_par.engine_max_w)) {
+        result.p_eng_w = seen->p_eng_before_w; /* the greatest stands for one that is not known */
+    } else {
+        /* the least that will do */
+    }
+    return result;
 }
 
 /* Brakes take braking power that the battery cannot: it then has to take P_eng - P_aux at most.
@@ -188,12 +197,11 @@ mpc_command mpc_safety_admissible(mpc_command wish, const mpc_measured *seen)
         on[first + LIMITS - 1] = (kept != 0) ? REAL(0.0) : distance(warmth, made_w);
         off[first + LIMITS - 1] = distance(warmth, REAL(0.0));
     }
+    const mpc_command wanted = lasting(wish, seen);
     mpc_command command = {REAL(0.0), 0};
-    if (better(goes_on(wish, seen), on, off) != 0) {
-        const int32_t wanted = ((wish.engine_on != 0) && (wish.p_eng_w >= REAL(0.0))) ? 1 : 0;
-        command.engine_on = 1; /* at the power wished for; a NaN is none */
-        command.p_eng_w =
-            real_clip((wanted != 0) ? wish.p_eng_w : REAL(0.0), running.low, running.high);
+    if (better(wanted.engine_on, on, off) != 0) {
+        command.engine_on = 1;
+        command.p_eng_w = real_clip(wanted.p_eng_w, running.low, running.high);
     }
     return command;
 }

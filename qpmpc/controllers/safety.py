@@ -48,7 +48,7 @@ class SafetyLayer:
     exceeds the limits by less: first battery and engine power, then SOC, then coolant; where all
     are kept, in the same order the limits drawn in by a margin. Of such commands it takes the one
     nearest to the wish: the same on or off where possible, then the nearest power. While the
-    shortest run or rest of the engine is not over, the wish is that it goes on.
+    shortest run or rest of the engine is not over, the wish is that it goes on as it does.
 
     Parameters
     ----------
@@ -85,11 +85,10 @@ class SafetyLayer:
             kept = by_heat.low_w <= running.low_w <= by_heat.high_w  # whatever rounding leaves
             on_excess.append(0.0 if kept else allowed_heat.distance_w(heat.of(running.low_w)))
             off_excess.append(allowed_heat.distance_w(0.0))
-        wish_on = self._goes_on(wish, seen)
+        wish_on, wanted_w = self._lasting(wish, seen)
         on = wish_on if on_excess == off_excess else on_excess < off_excess
         if not on:
             return Command(False, 0.0)
-        wanted_w = wish.p_eng_w if wish.engine_on and wish.p_eng_w >= 0.0 else 0.0  # nor nan
         return Command(True, min(max(wanted_w, running.low_w), running.high_w))
 
     def _greatest_w(self, seen: Observation) -> float:
@@ -99,11 +98,16 @@ class SafetyLayer:
         ramped_w = before_w + engine.ramp_w_per_s * self._plant.step_s - POWER_MARGIN_W
         return max(min(ramped_w, engine.power_max_w), engine.power_min_w)
 
-    def _goes_on(self, wish: Command, seen: Observation) -> bool:
-        """Whether the engine is wished on; as it is while its shortest run or rest lasts."""
+    def _lasting(self, wish: Command, seen: Observation) -> tuple[bool, float]:
+        """Engine on or off, and its power if on; as before while its shortest run or rest lasts."""
         engine = self._vehicle.engine
         shortest_s = engine.min_on_s if seen.engine_on else engine.min_off_s
-        return bool(seen.engine_on if seen.engine_for_s < shortest_s else wish.engine_on)
+        lasts = seen.engine_for_s < shortest_s
+        wanted_w = wish.p_eng_w if wish.engine_on and wish.p_eng_w >= 0.0 else 0.0  # nor nan
+        if lasts and seen.engine_on and not wish.engine_on:
+            is_known = seen.p_eng_before_w < engine.power_max_w
+            wanted_w = seen.p_eng_before_w if is_known else 0.0
+        return bool(seen.engine_on if lasts else wish.engine_on), wanted_w
 
     def _battery_w(self, seen: Observation, margin: bool) -> Interval:
         """Engine powers at which the battery's power stays in its limits.

@@ -55,9 +55,9 @@ def _times(row: Row) -> str:
     return " / ".join(f"{times[key]:.3g}" for key in ("median", "p99", "max"))
 
 
-def _share(row: Row) -> str:
-    share = row["sigma_integral_share"]
-    return NONE if share is None else f"{100.0 * share:.1f}"
+def _percent(row: Row, key: str) -> str:
+    share = row[key]
+    return number(None if share is None else 100.0 * share, 1)
 
 
 NAMES = (
@@ -78,9 +78,12 @@ STATE = (
 )
 OPERATION = (
     Column("starts", lambda row: str(row["engine_starts"])),
+    Column("per km", lambda row: number(row["engine_starts_per_km"], 2)),
+    Column("shortest run s", lambda row: number(row["engine_on_s"]["min"], 0)),
+    Column("below 3 s %", lambda row: _percent(row, "engine_runs_below_3s_share")),
     Column("violations", violations_text),
     Column("fallback s", lambda row: str(row["fallback_steps"])),
-    Column("integral %", _share),
+    Column("integral %", lambda row: _percent(row, "sigma_integral_share")),
     Column("step ms med / p99 / max", _times),
 )
 

@@ -50,6 +50,13 @@ FIGURES: dict[str, type] = {
     "solver.iterations_median": float,
     "remarks": list,
     **FLAGS,
+    "engine_starts_per_km": float,
+    "engine_on_s.min": int,
+    "engine_on_s.median": float,
+    "engine_runs_below_3s_share": float,
+    "engine_runs_below_min_on_s": int,
+    "fuel_starts_g": float,
+    "friction_brake_j": float,
     "faults_effect": str,
 }
 PROVENANCE: dict[str, type] = {

@@ -10,9 +10,12 @@ KEYS = {
     "comparable", "soc_init", "soc_end", "soc_min", "soc_max", "t_cl_min_degc", "t_cl_max_degc",
     "t_cl_end_degc", "engine_starts", "engine_on_share", "violations", "fallback_steps",
     "relaxation_gap", "sigma_integral_share", "step_time_ms", "solver", "remarks",
+    "engine_starts_per_km", "engine_on_s", "engine_runs_below_3s_share",
+    "engine_runs_below_min_on_s", "fuel_starts_g", "friction_brake_j",
 }  # fmt: skip
 INNER_KEYS = {
     "violations": {"soc", "t_cl_degc", "power_w"},
+    "engine_on_s": {"min", "median"},
     "relaxation_gap": {"max", "mean"},
     "step_time_ms": {"median", "p99", "max"},
     "solver": {"name", "implementation", "iterations_max", "iterations_median"},

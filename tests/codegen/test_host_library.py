@@ -354,9 +354,7 @@ def test_a_new_route_is_taken_from_its_second_second_on() -> None:
 
 def _longer(preview: Preview, factor: float) -> Preview:
     long = preview.long
-    return preview._replace(
-        long=replace(long, duration_s=factor * long.duration_s)
-    )
+    return preview._replace(long=replace(long, duration_s=factor * long.duration_s))
 
 
 def test_when_solves_fail_again_and_again_both_start_cold(monkeypatch) -> None:

@@ -94,3 +94,58 @@ def test_start_fuel_warms_the_coolant_too() -> None:
     command = SafetyLayer(plant).admissible(Command(True, 60e3), seen)
     after, _ = plant.step(state, command, 20e3, 30.0)
     assert after.t_cl_degc <= 90.0
+
+
+STARTING = CAR.with_settings(
+    {
+        "engine.start_energy_j": 4e3,
+        "engine.ramp_w_per_s": 9.5e3,
+        "engine.min_on_s": 4,
+        "engine.min_off_s": 3,
+    }
+)
+LAYER = SafetyLayer(Plant(STARTING))
+
+
+def test_a_start_leaves_the_battery_the_power_that_cranks_the_engine() -> None:
+    # 27 kW of battery: off gives 24.4 kW, a start at 0 W would give 28.4 kW
+    stopped = Observation(0, 0.6, 60.0, False, 24e3, 15.0)
+    assert LAYER.admissible(OFF, stopped) == OFF
+    command = LAYER.admissible(Command(True, 0.0), stopped)
+    assert command.p_eng_w == pytest.approx(24.4e3 + 4e3 - 27e3 + 0.1)
+
+
+@given(soc=st.floats(0.79, 0.85), demand_w=st.floats(-5e3, 10e3), speed_mps=st.floats(0.0, 30.0))
+@example(soc=0.805, demand_w=0.0, speed_mps=0.0)
+def test_no_engine_is_started_only_to_discharge_a_full_battery(soc, demand_w, speed_mps) -> None:
+    seen = Observation(0, soc, 60.0, False, demand_w, speed_mps)
+    assert LAYER.admissible(OFF, seen) == OFF
+
+
+def test_power_rises_by_the_ramp_from_the_power_before() -> None:
+    running = Observation(0, 0.6, 60.0, True, 20e3, 15.0, 9, 5e3)
+    stopped = running._replace(engine_on=False)  # the power before is 0, whatever else is told
+    unknown = running._replace(p_eng_before_w=math.inf)
+    wish = Command(True, 40e3)
+    for seen, most_w in ((running, 14.5e3 - 0.1), (stopped, 9.5e3 - 0.1), (unknown, 40e3)):
+        assert LAYER.admissible(wish, seen).p_eng_w == pytest.approx(most_w)
+
+
+def test_the_shortest_run_and_rest_last_as_long_as_no_limit_is_at_stake() -> None:
+    running = Observation(0, 0.6, 60.0, True, 5e3, 15.0, 3, 7e3)
+    assert LAYER.admissible(OFF, running) == Command(True, 7e3)  # as in the last second
+    assert LAYER.admissible(Command(True, 2e3), running) == Command(True, 2e3)
+    assert LAYER.admissible(OFF, running._replace(engine_for_s=4)) == OFF
+    assert LAYER.admissible(OFF, running._replace(t_cl_degc=91.0)) == OFF  # too hot
+    resting = Observation(0, 0.6, 60.0, False, 5e3, 15.0, 2)
+    wish = Command(True, 8e3)
+    assert LAYER.admissible(wish, resting) == OFF
+    assert LAYER.admissible(wish, resting._replace(engine_for_s=3)) == wish
+    emptied = LAYER.admissible(wish, resting._replace(soc=0.4))
+    assert emptied.engine_on
+    assert 9.4e3 < emptied.p_eng_w < 9.5e3  # demand, auxiliaries and its own cranking
+
+
+def test_an_engine_found_running_at_a_power_that_is_not_known_idles_to_the_end() -> None:
+    seen = Observation(0, 0.6, 60.0, True, 5e3, 15.0, 1)
+    assert LAYER.admissible(OFF, seen) == Command(True, 0.0)
