@@ -14,7 +14,6 @@ from qpmpc.codegen.values import values_of
 from qpmpc.controllers.base import Controller, Decision, Progress, Receive
 from qpmpc.controllers.monitor import Flag
 from qpmpc.controllers.settings import ControllerSettings, MhQpSettings
-from qpmpc.qp.rows import VARS
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.plant import Command
 
@@ -47,6 +46,7 @@ class InputBuilder:
         into.long_net_w[:] = long.net_w.tolist()
         into.long_speed_mps[:] = long.speed_mps.tolist()
         into.long_internal_off_w[:] = long.internal_off_w.tolist()
+        into.long_rises[:] = long.rises.tolist()
 
 
 class GeneratedController(Controller):
@@ -136,14 +136,15 @@ class GeneratedController(Controller):
         self.library.init(self._state)
 
     def plan(self) -> tuple[Floats, Floats]:
-        """Return the last solution in SI units: variables (n, 7), duals (n, rows)."""
-        sizes = self.library.values.sizes
-        x = (self.library.real * (sizes.stages * VARS))()
-        duals = (self.library.real * (sizes.stages * sizes.rows))()
+        """Return the last solution in SI units: variables (n, variables), duals (n, rows)."""
+        values = self.library.values
+        stages = values.sizes.stages
+        x = (self.library.real * (stages * values.variables))()
+        duals = (self.library.real * (stages * values.rows.count))()
         self.library.plan(self._state, x, duals)
         return (
-            np.array(x, dtype=float).reshape(sizes.stages, VARS),
-            np.array(duals, dtype=float).reshape(sizes.stages, sizes.rows),
+            np.array(x, dtype=float).reshape(stages, -1),
+            np.array(duals, dtype=float).reshape(stages, -1),
         )
 
 

@@ -9,6 +9,7 @@ def forecast_scalars(vehicle: Vehicle, horizon: HorizonSettings) -> dict[str, fl
     return {
         "class_hard_w": horizon.class_hard_w,
         "class_braking_w": horizon.class_braking_w,
+        "rise_share": horizon.rise_share,
         **vehicle.chassis.model_dump(),
     }
 

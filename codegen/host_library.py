@@ -25,10 +25,9 @@ from qpmpc.codegen.examples import is_example
 from qpmpc.codegen.generate import Algorithm, Precision, project_files
 from qpmpc.codegen.library_cache import Kept, kept_file
 from qpmpc.codegen.values import Values
-from qpmpc.qp.rows import VARS
 from qpmpc.remarks import say_once
 
-ABI_VERSION = 3
+ABI_VERSION = 4
 _ABI_NAMES = (
     "version",
     "sizeof mpc_real",
@@ -70,6 +69,7 @@ def structures(precision: Precision, short: int, long: int) -> tuple[Any, Any]:
             ("long_net_w", real * long),
             ("long_speed_mps", real * long),
             ("long_internal_off_w", real * long),
+            ("long_rises", real * long),
             ("short_count", ctypes.c_int32),
             ("second", ctypes.c_int32),
             ("engine_on", ctypes.c_int32),
@@ -164,8 +164,8 @@ class HostLibrary:
             self.state_bytes,
             sizes.short_stages,
             sizes.long_stages,
-            VARS,
-            sizes.rows,
+            values.variables,
+            values.rows.count,
             values.iterations,
             self.input_type.short_count.offset,
             self.output_type.engine_on.offset,

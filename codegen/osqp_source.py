@@ -10,9 +10,8 @@ import numpy as np
 import osqp
 import scipy.sparse as sp
 
-from qpmpc.codegen.values import Sizes, Values
+from qpmpc.codegen.values import Values
 from qpmpc.errors import InputError
-from qpmpc.qp.rows import ROWS, Rows
 from qpmpc.qp.structure import QpStructure
 from qpmpc.solvers.osqp import SAME_WORK
 
@@ -96,11 +95,11 @@ def _set_up(values: Values) -> osqp.OSQP:
                 f"mh_qp.admm.{NAMES[name]} = {value:g} is too small for the code that OSQP "
                 f"generates, which has {DECIMALS} decimals"
             )
-    pattern = matrix_pattern(values.sizes)
+    pattern = matrix_pattern(values)
     rows, variables = pattern.shape
     # which rows are equalities must be right: a change refactorises
-    layout = Rows(fuel=values.sizes.fuel_pieces, battery=values.sizes.battery_pieces)
-    equalities = [layout.first(row.name) for row in ROWS if row.is_equality]
+    layout = values.rows
+    equalities = [layout.first(row.name) for row in values.table.rows if row.is_equality]
     is_equality = np.isin(np.arange(rows) % layout.count, equalities)
     solver = osqp.OSQP()
     solver.setup(
@@ -119,8 +118,8 @@ def _set_up(values: Values) -> osqp.OSQP:
     return solver
 
 
-def matrix_pattern(sizes: Sizes) -> sp.csc_matrix:
+def matrix_pattern(values: Values) -> sp.csc_matrix:
     """Return A with ones for entries."""
-    rows = Rows(fuel=sizes.fuel_pieces, battery=sizes.battery_pieces)
-    structure = QpStructure(sizes.stages, rows)
-    return structure.matrix_of(structure.data(np.ones((sizes.stages, len(structure.index)))))
+    stages = values.sizes.stages
+    structure = QpStructure(stages, values.rows)
+    return structure.matrix_of(structure.data(np.ones((stages, len(structure.index)))))

@@ -16,7 +16,7 @@ from qpmpc.preview import checked
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp import coolant_floor, linearisation, rows, stage_qp
 from qpmpc.qp.quantities import pieces_of
-from qpmpc.qp.rows import Rows
+from qpmpc.qp.rows import Rows, Table, table_of
 from qpmpc.qp.stage_qp import qp_parameters
 from qpmpc.solvers import base
 from qpmpc.solvers.settings import AdmmSettings
@@ -41,7 +41,7 @@ CONSTANTS: dict[str, dict[str, float]] = {
         (checked, "LONGEST_STAGE_S NEWS"),
         (stage_qp, "LEAST_COST"),
         (coolant_floor, "USABLE"),
-        (rows, "SHORTEST_SCALE_S REACH_MARGIN_SOC ACCURATE_STAGE_S SIGMA_FORCED MOOT_G_PER_S"),
+        (rows, "SHORTEST_SCALE_S ACCURATE_STAGE_S SIGMA_FORCED MOOT_G_PER_S"),
         (base, "LARGEST_PLAUSIBLE"),
         (demand, "GRAVITY_MPS2"),
     )
@@ -78,11 +78,6 @@ class Sizes:
         """All stages."""
         return self.short_stages + self.long_stages
 
-    @property
-    def rows(self) -> int:
-        """Rows of a stage."""
-        return Rows(fuel=self.fuel_pieces, battery=self.battery_pieces).count
-
 
 @dataclass(frozen=True)
 class Values:
@@ -91,6 +86,7 @@ class Values:
     Attributes
     ----------
     vehicle : its name
+    table : of its QP
     sizes : dimensions
     scalars, counts, arrays : members of the runtime's `mpc_model`
     iterations, departure_iterations : K of a step and of each linearisation before the trip
@@ -100,6 +96,7 @@ class Values:
     """
 
     vehicle: str
+    table: Table
     sizes: Sizes
     scalars: dict[str, float]
     arrays: dict[str, NDArray[np.float64]]
@@ -111,6 +108,16 @@ class Values:
     departure_linearisations: int = DEPARTURE_LINEARISATIONS
     plan_valid_steps: int = PLAN_VALID_STEPS
     warm_up_steps: int = WARM_UP_STEPS
+
+    @property
+    def rows(self) -> Rows:
+        """Rows of a stage."""
+        return Rows(self.table, self.sizes.fuel_pieces, self.sizes.battery_pieces)
+
+    @property
+    def variables(self) -> int:
+        """Number of variables of a stage."""
+        return len(self.table.variables)
 
 
 def values_of(
@@ -173,6 +180,7 @@ def values_of(
     }
     return Values(
         vehicle=vehicle.name,
+        table=table_of(vehicle.engine),
         sizes=Sizes(
             settings.horizon.short_stages,
             blocks,
@@ -221,7 +229,6 @@ def _plant(vehicle: Vehicle, line: OptimalLine, maps: BatteryMaps) -> dict[str, 
         **{f"cold_{name}": float(value) for name, value in cold.model_dump().items()},
         **{f"can_{name}": value for name, value in asdict(Capability.of(vehicle, line)).items()},
         "charge_c": maps.charge_c,
-        "start_fuel_g": vehicle.engine.start_fuel_g,
         "start_energy_j": vehicle.engine.start_energy_j,
         "ramp_w_per_s": vehicle.engine.ramp_w_per_s,
         "aux_power_w": vehicle.battery.aux_power_w,

@@ -57,6 +57,7 @@ CHECKS = Names(
             "safety",
             "epa",
             "bounds",
+            "starts",
         )
     },
 )

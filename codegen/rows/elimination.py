@@ -4,11 +4,12 @@ The entries of the factor are found here, by symbolic elimination on the pattern
 rows: a new variable or entry needs no edit.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import combinations_with_replacement, permutations
+from typing import Self
 
 from qpmpc.codegen.rows.stage_c import function, is_unit, member, of_pieces, struct, variable
-from qpmpc.qp.rows import ROWS, Entry, Row, Var, states
+from qpmpc.qp.rows import Entry, Row, Table, Var
 
 
 def weight(row: Row) -> str:
@@ -19,26 +20,34 @@ def weight(row: Row) -> str:
 class Elimination:
     """The factor L D L' of a stage, column by column.
 
-    First the states of the previous stage, whose elimination that stage has prepared, then the
-    stage's own variables: next the one that leaves the fewest entries, the states last, because
-    the next stage needs them.
+    First those variables of the previous stage that rows of this one contain, whose elimination
+    that stage has prepared, then the stage's own variables: next the one that leaves the fewest
+    entries, those that the next stage needs last.
+
+    Parameters
+    ----------
+    table : rows
+    coupling : the variables that couple stages, in the order of their elimination
 
     Attributes
     ----------
     columns : by pivot, the entries below it, in the order of elimination
     """
 
-    def __init__(self) -> None:
-        edges: dict[Entry, set[Entry]] = {Entry(var, False): set() for var in reversed(Var)}
-        before = [Entry(state, True) for state in states()]
-        ends = [Entry(state, False) for state in states()]
+    def __init__(self, table: Table, coupling: Sequence[Var]) -> None:
+        self.table = table
+        edges: dict[Entry, set[Entry]] = {
+            Entry(var, False): set() for var in reversed(table.variables)
+        }
+        before = [Entry(var, True) for var in coupling]
+        ends = [Entry(var, False) for var in coupling]
         edges |= {entry: set() for entry in before}
 
         def connect(members: Iterable[Entry]) -> None:
             for one, other in permutations(members, 2):
                 edges[one].add(other)
 
-        for row in ROWS:
+        for row in table.rows:
             connect(row.terms)
         connect(before)  # by the elimination of the previous stage
         connect(ends)  # by rows of the next stage
@@ -56,6 +65,17 @@ class Elimination:
         self.columns = {
             p: sorted(column, key=self._rank.__getitem__) for p, column in found.items()
         }
+
+    @classmethod
+    def shortest(cls, table: Table) -> Self:
+        """Return that with the fewest entries over all orders of the coupling variables."""
+        orders = permutations(table.coupling)
+        return min((cls(table, order) for order in orders), key=lambda e: e.count)
+
+    @property
+    def count(self) -> int:
+        """Entries of a stage's factor."""
+        return sum(len(list(self.factors(before))) for before in (True, False))
 
     def pair(self, one: Entry, other: Entry) -> tuple[Entry, Entry]:
         """Return a pair, the one eliminated later first."""
@@ -110,7 +130,7 @@ def factorise(e: Elimination) -> str:
     lines += [f"mpc_real {e.normal(*pair)} = REAL(0.0);" for pair in e.pairs()]
     lines += _assemble(e)
     lines += ["if (after != NULL) {", "    const mpc_stage_matrix *const next = &after->a;"]
-    for row in ROWS:
+    for row in e.table.rows:
         known = [entry for entry in row.terms if entry.before]
         for one, other in combinations_with_replacement(known, 2):
             name = e.normal(Entry(one.var, False), Entry(other.var, False))
@@ -136,7 +156,7 @@ def _assemble(e: Elimination) -> list[str]:
     inequalities: list[str] = []
     equalities: list[str] = []
     touched = set()
-    for row in ROWS:
+    for row in e.table.rows:
         products = []
         for one, other in combinations_with_replacement(row.terms, 2):
             if not (one.before and other.before):

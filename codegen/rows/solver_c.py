@@ -23,28 +23,29 @@ from qpmpc.codegen.rows.stage_c import (
     values_h,
     variable,
 )
-from qpmpc.qp.rows import ROWS, Entry, Var
+from qpmpc.qp.rows import Entry, Table
 
 MATRIX = "const mpc_stage_matrix *const a = &stage->a;"
 
 
 @lru_cache(maxsize=8)
-def rows_files(scalars: tuple[str, ...], algorithm: str) -> dict[str, str]:
+def rows_files(table: Table, scalars: tuple[str, ...], algorithm: str) -> dict[str, str]:
     """Return the headers that are made from the table of rows, by name; not to be changed.
 
     Parameters
     ----------
+    table : of the vehicle
     scalars : names of the controller's parameters
     algorithm : `admm` or `osqp`
     """
     files = {
         "mpc_heat.h": heat_h(scalars),
-        "mpc_rows.h": types_h(),
-        "mpc_rows_values.h": values_h(scalars),
+        "mpc_rows.h": types_h(table),
+        "mpc_rows_values.h": values_h(table, scalars),
     }
     if algorithm == "osqp":
-        return files | {"mpc_rows_osqp.h": osqp_h()}
-    e = Elimination()  # one order of pivots for all of the solver
+        return files | {"mpc_rows_osqp.h": osqp_h(table)}
+    e = Elimination.shortest(table)  # one order of pivots for all of the solver
     return files | {"mpc_rows_factor.h": factor_h(e), "mpc_rows_admm.h": admm_h(e)}
 
 
@@ -60,29 +61,29 @@ def admm_h(e: Elimination) -> str:
         "mpc_rows_admm.h",
         "An iteration of ADMM, row by row.",
         ["mpc_admm.h", "mpc_parts.h"],
-        _multiply(),
+        _multiply(e.table),
         factorise(e),
-        _right_hand_side(),
+        _right_hand_side(e.table),
         substitute(e),
-        _update_z_y(),
+        _update_z_y(e.table),
     )
 
 
-def osqp_h() -> str:
+def osqp_h(table: Table) -> str:
     """Return `mpc_rows_osqp.h`: entries column by column, in OSQP's order, and bounds."""
     return header(
         "mpc_rows_osqp.h",
         "The rows in OSQP's order.",
         ["mpc_parts.h", "mpc_real.h"],
         "#define UNLIMITED REAL(1.0e30)\n",
-        _put_columns(),
-        _put_bounds(),
+        _put_columns(table),
+        _put_bounds(table),
     )
 
 
-def _multiply() -> str:
+def _multiply(table: Table) -> str:
     lines = [MATRIX]
-    for row in ROWS:
+    for row in table.rows:
         lines += of_pieces(row, [f"value[{place(row)}] = {product(row)};"])
     return function(
         "void rows_multiply(const mpc_stage *stage, const mpc_real *x, const mpc_real *before,\n"
@@ -92,12 +93,12 @@ def _multiply() -> str:
     )
 
 
-def _right_hand_side() -> str:
+def _right_hand_side(table: Table) -> str:
     lines = [MATRIX]
-    for var in Var:
+    for var in table.variables:
         start = f"(mpc_par.proximal * stage->x[{variable(var)}]) - stage->q[{variable(var)}]"
         lines.append(f"mpc_real {var.name.lower()} = {start};")
-    for row in ROWS:
+    for row in table.rows:
         at = place(row)
         name = "w" if row.pieces else f"w_{row.name}"
         weighted = f"({weight(row)} * stage->z[{at}]) - stage->y[{at}]"
@@ -106,7 +107,7 @@ def _right_hand_side() -> str:
             sum_ = f"work_before[{variable(entry.var)}]" if entry.before else entry.name
             inside.append(f"{sum_} += {'' if is_unit(row) else f'{member(row, entry)} * '}{name};")
         lines += of_pieces(row, inside)
-    lines += [f"stage->work[{variable(var)}] = {var.name.lower()};" for var in Var]
+    lines += [f"stage->work[{variable(var)}] = {var.name.lower()};" for var in table.variables]
     return function(
         "void rows_right_hand_side(mpc_stage *stage, mpc_real *work_before)",
         "work = s x - q + A'(Rz - y), with the rows' part for the previous stage",
@@ -114,10 +115,10 @@ def _right_hand_side() -> str:
     )
 
 
-def _update_z_y() -> str:
+def _update_z_y(table: Table) -> str:
     lines = [MATRIX, "const mpc_stage_bounds *const b = &stage->b;"]
     lines.append("const mpc_real *const x = stage->work;")
-    for row in ROWS:
+    for row in table.rows:
         low, high = bounds(row)
         at = f"&stage->z[{place(row)}], &stage->y[{place(row)}]"
         if row.is_equality:
@@ -136,15 +137,15 @@ def _update_z_y() -> str:
     )
 
 
-def _put_columns() -> str:
+def _put_columns(table: Table) -> str:
     lines = ["int32_t at = first;"]
-    for var in Var:
+    for var in table.variables:
         here, before = Entry(var, False), Entry(var, True)
-        for row in ROWS:
+        for row in table.rows:
             if here in row.terms:
                 value = "REAL(1.0)" if is_unit(row) else member(row, here)
                 lines += of_pieces(row, [f"values[at] = {value};", "at++;"])
-        for row in ROWS:
+        for row in table.rows:
             if before in row.terms:
                 value = member(row, before, "next")
                 lines += ["if (next != NULL) {", f"    values[at] = {value};", "    at++;", "}"]
@@ -156,9 +157,9 @@ def _put_columns() -> str:
     )
 
 
-def _put_bounds() -> str:
+def _put_bounds(table: Table) -> str:
     lines = []
-    for row in ROWS:
+    for row in table.rows:
         low, high = bounds(row)
         both = [f"low[{place(row)}] = {low or '-UNLIMITED'};"]
         both.append(f"high[{place(row)}] = {high or 'UNLIMITED'};")

@@ -8,7 +8,7 @@ from qpmpc.qp import rows
 from qpmpc.qp.coolant import radiator_w_per_k, thermostat_step
 from qpmpc.qp.expressions import is_number, names_in, parsed, targets_of
 from qpmpc.qp.quantities import ABOUT, FLOOR, INPUTS, ORIGIN, STAGE
-from qpmpc.qp.rows import ROWS, VARIABLES, Entry, Row, Var
+from qpmpc.qp.rows import VARIABLES, Entry, Row, Table, Var
 from qpmpc.vehicle import heat
 
 PIECES = ("fuel_slope", "fuel_intercept", "battery_slope", "battery_intercept")
@@ -120,26 +120,27 @@ def struct(comment: str, name: str, members: Iterable[str]) -> str:
     return f"/* {comment} */\ntypedef struct {{\n{indented(lines)}}} {name};\n"
 
 
-def types_h() -> str:
+def types_h(table: Table) -> str:
     """Return `mpc_rows.h`: numbers of variables and rows, entries and bounds of a stage."""
-    variables = [f"{variable(var)} = {var.value}," for var in Var] + [f"MPC_VARS = {len(Var)}"]
+    variables = [f"{variable(var)} = {var.value}," for var in table.variables]
+    variables.append(f"MPC_VARS = {len(table.variables)}")
     places, at = [], "0"
-    for row in ROWS:
+    for row in table.rows:
         name = f"MPC_ROW_{row.name.upper()}"
         places.append(f"{name} = {at},")
         at = f"{name} + {size(row).strip('[]') or 1}"
-    entries = [f"({len(r.terms)} * {size(r).strip('[]')})" for r in ROWS if r.pieces]
-    entries.append(str(sum(len(row.terms) for row in ROWS if not row.pieces)))
-    before = sum(entry.before for row in ROWS for entry in row.terms)
+    entries = [f"({len(r.terms)} * {size(r).strip('[]')})" for r in table.rows if r.pieces]
+    entries.append(str(sum(len(row.terms) for row in table.rows if not row.pieces)))
+    before = sum(entry.before for row in table.rows for entry in row.terms)
     places.append(f"MPC_ROWS = {at},")
     places.append(f"MPC_ENTRIES = {' + '.join(entries)}, /* of a stage */")
     places.append(f"MPC_ENTRIES_BEFORE = {before} /* of them */")
     matrix: list[str] = []
-    for row in ROWS:
+    for row in table.rows:
         if not is_unit(row):
             inside = (f"    mpc_real {entry.name};" for entry in row.terms)
             matrix += ["struct {", *inside, f"}} {row.name}{size(row)};"]
-    limits = [f"{name}{size(row)}" for row in ROWS for name in bound_members(row).values()]
+    limits = [f"{name}{size(row)}" for row in table.rows for name in bound_members(row).values()]
     return header(
         "mpc_rows.h",
         "Variables, rows and entries of a stage.",
@@ -170,42 +171,46 @@ def _running() -> list[str]:
     ]
 
 
-def values_h(scalars: Iterable[str]) -> str:
+def values_h(table: Table, scalars: Iterable[str]) -> str:
     """Return `mpc_rows_values.h`: entries, bounds, scaling and cost of a stage."""
     names = {name: f"mpc_par.{name}" for name in scalars}
     names |= {name: f"mpc_par.{name}[i]" for name in PIECES}
     names |= {name: f"road->{name}" for name in INPUTS}
     names |= {name: f"state->{name}" for name in (*ORIGIN, FLOOR[1])}
     names |= {name: name for name, value in vars(rows).items() if isinstance(value, float)}
-    names |= {"start_soc": "REAL(0.0)", "is_last": "is_last"}
+    names |= {"start_soc": "REAL(0.0)", "is_last": "is_last", "on_now": "on_now"}
     return header(
         "mpc_rows_values.h",
         "Values of a stage's rows, scaled to unit norm, and its weights in the cost.",
         ["mpc_constants.h", "mpc_heat.h", "mpc_model.h", "mpc_parts.h", "mpc_real.h"],
-        _scale(),
-        _fill(Writer(names, FUNCTIONS)),
+        _scale(table),
+        _fill(table, Writer(names, FUNCTIONS)),
     )
 
 
-def _scale() -> str:
+def _scale(table: Table) -> str:
     """SI units per solver unit, longer stages finer; and the small quadratic cost of rates."""
     stretch = "MPC_STRETCH(real_max(stage->road.duration_s, SHORTEST_SCALE_S))"
     lines = [f"const mpc_real stretch = {stretch};"]
-    for var, scaled in VARIABLES.items():
+    for var in table.variables:
+        scaled = VARIABLES[var]
         parts = [] if scaled.unit == "1.0" else [f"mpc_par.{scaled.unit}"]
         parts += ["stretch"] if scaled.is_rate else []
-        lines.append(f"stage->column[{variable(var)}] = {' * '.join(parts)};")
-        curvature = "REAL(0.0)" if var in rows.states() else "mpc_par.regularisation"
+        lines.append(f"stage->column[{variable(var)}] = {' * '.join(parts) or 'REAL(1.0)'};")
+        curvature = "REAL(0.0)" if var in table.states else "mpc_par.regularisation"
         lines.append(f"stage->hessian[{variable(var)}] = {curvature};")
     return function("void rows_scale(mpc_stage *stage)", "Column scale and Hessian.", lines)
 
 
-def _fill(writer: Writer) -> str:
+def _fill(table: Table, writer: Writer) -> str:
     lines = ["const mpc_real is_last = (k == (MPC_STAGES - 1)) ? REAL(1.0) : REAL(0.0);"]
     lines += writer.lines(parsed(rows.QUANTITIES))
-    for row in ROWS:
+    if table.has_start:
+        running = "(mpc_real)state->watch.good.engine_on"
+        lines.append(f"const mpc_real on_now = (k == 0) ? {running} : REAL(0.0);")
+    for row in table.rows:
         lines += of_pieces(row, _fill_row(row, writer))
-    for entry, factor in rows.cost_terms().items():
+    for entry, factor in table.cost.items():
         line = f"q[{variable(entry.var)}] += {writer.expression(factor)};"
         known = ["if (k > 0) {", f"    state->stage[k - 1].{line}", "}"]
         lines += known if entry.before else [f"stage->{line}"]
@@ -233,6 +238,8 @@ def _fill_row(row: Row, writer: Writer) -> list[str]:
         lines = []
         for entry, factor in row.terms.items():
             text = f"column[{variable(entry.var)}]"  # a state's is that of the previous stage too
+            if entry.before and VARIABLES[entry.var].is_rate:
+                text = f"state->stage[k - 1].{text}"
             if not is_number(factor, 1.0):
                 text = f"{writer.inner(factor)} * {text}"
             if entry.before:

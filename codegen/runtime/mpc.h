@@ -38,12 +38,15 @@ typedef struct {
     /* statistics of the trip beyond, block by block, in each block class by class (hard driving,
      * easy driving, braking): seconds, mean of the net power P0 = demand + auxiliaries (each
      * second clipped at the battery's charge limit before the mean is taken), mean speed, mean of
-     * the internal battery power l(P0) with the engine off. 0 seconds where nothing is left.
+     * the internal battery power l(P0) with the engine off; and how often the demand rises into
+     * that class or past it, which matters where starts of the engine cost something (0 if it is not
+     * known: they are then counted over the short horizon alone). 0 seconds where nothing is left.
      * mpc_forecast.h makes the preview from demand and speed of the trip. */
     mpc_real long_duration_s[MPC_LONG];
     mpc_real long_net_w[MPC_LONG];
     mpc_real long_speed_mps[MPC_LONG];
     mpc_real long_internal_off_w[MPC_LONG];
+    mpc_real long_rises[MPC_LONG];
     int32_t short_count; /* seconds of the short preview before arrival, 1..MPC_SHORT */
     int32_t second;      /* clock: seconds since departure */
     int32_t engine_on;   /* measured: 1 if the engine ran in the last second, else 0 */
@@ -97,7 +100,7 @@ void mpc_plan(const mpc_state *state, mpc_real *x, mpc_real *duals);
 /* Layout of this build, for callers in other languages to check theirs: version of this
  * interface, sizeof mpc_real, mpc_in, mpc_out, mpc_state, then MPC_SHORT, MPC_LONG, MPC_VARS,
  * MPC_ROWS, MPC_ITERATIONS, offset of mpc_in.short_count, of mpc_out.engine_on. */
-#define MPC_ABI_VERSION 3
+#define MPC_ABI_VERSION 4
 #define MPC_ABI_ENTRIES 12
 int32_t mpc_abi(int32_t entry);
 

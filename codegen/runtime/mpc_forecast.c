@@ -42,9 +42,16 @@ static void count(mpc_forecast *forecast, int32_t second, int32_t times)
 {
     const mpc_real demand_w = forecast->trip.demand_w[second];
     const mpc_real net_w = battery_side_w(demand_w);
-    const int32_t block = second / forecast->block_s;
-    mpc_class_sums *const to = &forecast->ahead[(block * MPC_CLASSES) + class_of(demand_w)];
+    mpc_class_sums *const block = &forecast->ahead[(second / forecast->block_s) * MPC_CLASSES];
+    const int32_t of_class = class_of(demand_w);
+    mpc_class_sums *const to = &block[of_class];
     const mpc_real sign = (mpc_real)times;
+    /* departure is from the lowest class */
+    const int32_t from = (second > 0) ? class_of(forecast->trip.demand_w[second - 1])
+                                      : (MPC_CLASSES - 1);
+    for (int32_t i = of_class; i < from; i++) {
+        block[i].rises += times;
+    }
     to->seconds += times;
     add_to(&to->net_w, sign * net_w);
     add_to(&to->speed_mps, sign * forecast->trip.speed_mps[second]);
@@ -54,7 +61,7 @@ static void count(mpc_forecast *forecast, int32_t second, int32_t times)
 static void sum_up(mpc_forecast *forecast)
 {
     static const mpc_class_sums none = {
-        0, {REAL(0.0), REAL(0.0)}, {REAL(0.0), REAL(0.0)}, {REAL(0.0), REAL(0.0)}};
+        0, 0, {REAL(0.0), REAL(0.0)}, {REAL(0.0), REAL(0.0)}, {REAL(0.0), REAL(0.0)}};
     for (int32_t k = 0; k < MPC_LONG; k++) {
         forecast->ahead[k] = none;
     }
@@ -139,6 +146,7 @@ static void fill_long(const mpc_forecast *forecast, int32_t is_arriving, mpc_in 
         in->long_duration_s[k] = share * seconds;
         in->long_net_w[k] = share * mean_of(&of->net_w, seconds);
         in->long_speed_mps[k] = share * mean_of(&of->speed_mps, seconds);
+        in->long_rises[k] = (is_arriving != 0) ? REAL(0.0) : (mpc_real)of->rises;
         /* with one class the preview is averaged: it has only the mean demand */
 #if MPC_CLASSES > 1
         in->long_internal_off_w[k] = share * mean_of(&of->internal_off_w, seconds);

@@ -38,6 +38,7 @@ typedef struct {
 /* The rest of one demand class of one block. */
 typedef struct {
     int32_t seconds;
+    int32_t rises; /* of the demand into it or past it */
     mpc_sum net_w;
     mpc_sum speed_mps;
     mpc_sum internal_off_w;

@@ -22,6 +22,7 @@ void mpc_qp_road(mpc_state *state, const mpc_in *in)
         stage->road.net_w = (seen != 0) ? battery_side_w(in->short_demand_w[k]) : REAL(0.0);
         stage->road.speed_mps = (seen != 0) ? in->short_speed_mps[k] : REAL(0.0);
         stage->road.internal_off_w = mpc_map_planned_internal_w(stage->road.net_w);
+        stage->road.rises = (seen != 0) ? REAL(1.0) : REAL(0.0);
     }
     for (int32_t k = 0; k < MPC_LONG; k++) {
         mpc_stage *const stage = &state->stage[MPC_SHORT + k];
@@ -29,6 +30,9 @@ void mpc_qp_road(mpc_state *state, const mpc_in *in)
         stage->road.net_w = in->long_net_w[k];
         stage->road.speed_mps = in->long_speed_mps[k];
         stage->road.internal_off_w = in->long_internal_off_w[k];
+        /* what rises into a class, falls from it to the next stage, the class below */
+        stage->road.rises = ((k % MPC_CLASSES) > 0) ? (-mpc_par.rise_share * in->long_rises[k - 1])
+                                                    : REAL(0.0);
     }
 }
 
@@ -45,6 +49,7 @@ void mpc_qp_road_move_up(mpc_state *state, int32_t by)
         road->net_w = seen * later->net_w;
         road->speed_mps = seen * later->speed_mps;
         road->internal_off_w = seen * later->internal_off_w;
+        road->rises = seen * later->rises;
     }
 }
 

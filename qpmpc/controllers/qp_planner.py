@@ -13,7 +13,7 @@ from qpmpc.errors import InputError
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.linearisation import Linearisation
-from qpmpc.qp.rows import VARS, Var
+from qpmpc.qp.rows import Var
 from qpmpc.qp.stage_qp import QpData, StageQp
 from qpmpc.solvers.base import QpSolution, QpSolver, Status, consistent, failed
 from qpmpc.solvers.names import make_solver
@@ -38,7 +38,7 @@ class QpPlan:
     Attributes
     ----------
     stages : the horizon
-    x : variables, shape (n, VARS), columns as in `Var`
+    x : variables, shape (n, variables), columns as in `Var`
     duals : g of fuel per SI unit of each row, shape (n, rows)
     solution : the solver's result
     """
@@ -201,7 +201,7 @@ class QpPlanner(Planner):
         start: tuple[Floats, Floats] | None,
         cold: bool = False,
     ) -> QpPlan:
-        data = self.qp.update(stages, seen.soc, seen.t_cl_degc, about)
+        data = self.qp.update(stages, seen.soc, seen.t_cl_degc, about, seen.engine_on)
         if not self._is_set_up and consistent(data):
             self.solver.setup(self.qp.structure, data)
             self._is_set_up = True
@@ -219,7 +219,7 @@ class QpPlanner(Planner):
             self.on_solve(Solve(data, primal, dual, cold, solution))
         return QpPlan(
             stages,
-            data.scaling.primal(solution.primal).reshape(-1, VARS),
+            data.scaling.primal(solution.primal).reshape(len(stages.duration_s), -1),
             data.scaling.dual(solution.dual).reshape(len(stages.duration_s), -1),
             solution,
         )

@@ -1,5 +1,6 @@
 """What a faulty signal or preview looks like to the controller."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -56,7 +57,7 @@ def altered_preview(fault: Fault, second: int, first: Preview, now: Preview) -> 
 def _missing(now: Preview) -> Preview:
     """Return an empty message: nothing is driven."""
     short, long = np.zeros_like(now.short_demand_w), np.zeros_like(now.long.duration_s)
-    return Preview(short, short.copy(), 0, Stages(long, long.copy(), long.copy(), long.copy()))
+    return Preview(short, short.copy(), 0, Stages(*np.zeros((5, len(long)))))
 
 
 def _wild(now: Preview, second: int) -> Preview:
@@ -72,6 +73,7 @@ def _wild(now: Preview, second: int) -> Preview:
             rng.uniform(-WILD_W, WILD_W, long),
             rng.uniform(0.0, WILD_MPS, long),
             rng.uniform(-WILD_W, WILD_W, long),
+            rng.uniform(0.0, WILD_S, long),
         ),
     )
 
@@ -96,4 +98,4 @@ def _too_long(now: Preview, late_s: int) -> Preview:
 
 
 def _lasting(long: Stages, duration_s: np.ndarray[Any, np.dtype[np.float64]]) -> Stages:
-    return Stages(duration_s, long.net_w, long.speed_mps, long.internal_off_w)
+    return replace(long, duration_s=duration_s)

@@ -110,6 +110,7 @@ class CheckedPreview:
             and _within(long.net_w, can.net_min_w, can.net_max_w)
             and _within(long.speed_mps, 0.0, can.speed_max_mps)
             and _within(long.internal_off_w, can.internal_min_w, can.internal_max_w)
+            and _within(long.rises, 0.0, LONGEST_STAGE_S)
         )
 
     def _goes_on(self, preview: Preview, step: int) -> bool:
@@ -158,7 +159,9 @@ def _within(values: NDArray[np.float64], low: float, high: float) -> bool:
 
 def _moved_up(stages: Stages, by: int, n_short: int) -> Stages:
     """Short stages move up by some seconds and are masked at the end; long ones stay."""
-    fields = np.stack([stages.duration_s, stages.net_w, stages.speed_mps, stages.internal_off_w])
+    fields = np.stack(
+        [stages.duration_s, stages.net_w, stages.speed_mps, stages.internal_off_w, stages.rises]
+    )
     moved = fields.copy()
     moved[:, : n_short - by] = fields[:, by:n_short]
     moved[:, n_short - by : n_short] = 0.0

@@ -21,6 +21,8 @@ class HorizonSettings(BaseModel):
         the short one recedes to arrival
     classes : 3 demand classes per block (hard, easy, braking) or 1 (the mean, as in the paper)
     class_hard_w, class_braking_w : demand above the first is hard, below the second braking
+    rise_share : starts that a block costs, per rise of its demand into a class and per on-share
+        there. Less than 1: an engine that runs in part of a class does so in its longest episodes
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -31,6 +33,7 @@ class HorizonSettings(BaseModel):
     classes: Literal[1, 3] = 3
     class_hard_w: Annotated[float, Field(ge=-1e6, le=1e6)] = 8000.0
     class_braking_w: Annotated[float, Field(ge=-1e6, le=1e6)] = -500.0
+    rise_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -10,7 +10,7 @@ from qpmpc.preview.forecast import Trace, internal_off_w
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.vehicle.parameters import Vehicle
 
-FIELDS = 4  # of `Stages`
+FIELDS = 4  # of `Stages` that are means or sums of seconds
 
 
 @dataclass(frozen=True)
@@ -26,12 +26,15 @@ class Stages:
     speed_mps : mean speed
     internal_off_w : mean of the internal battery power l(P0) with the engine off; by convexity
         more than l of the mean, which an averaged preview (one class) has to use
+    rises : r_k, starts of the engine in the stage per on-share that it has more than the stage
+        before: u_k >= r_k (sigma_k - sigma_k-1)
     """
 
     duration_s: NDArray[np.float64]
     net_w: NDArray[np.float64]
     speed_mps: NDArray[np.float64]
     internal_off_w: NDArray[np.float64]
+    rises: NDArray[np.float64]
 
 
 class Preview(NamedTuple):
@@ -41,7 +44,8 @@ class Preview(NamedTuple):
     ----------
     short_demand_w, short_speed_mps : of each of the coming N seconds, shape (N,)
     short_count : how many of them are driven before arrival
-    long : statistics of the trip beyond, block by block, class by class
+    long : statistics of the trip beyond, block by block, class by class; `rises`: how often the
+        demand rises into that class or past it
     """
 
     short_demand_w: NDArray[np.float64]
@@ -82,6 +86,7 @@ class StageBuilder:
         self._speed_mps = np.concatenate([truth.speed_mps, padding])
         demand_class = _demand_class(forecast.demand_w, settings)
         self._cumulative = _cumulative(forecast, vehicle, demand_class, settings.classes)
+        self._cumulative_rises = _cumulative_rises(demand_class, settings.classes)
         block_s = settings.block_length_s(forecast.steps)
         self.count = settings.stage_count(forecast.steps)
         start = np.arange(settings.block_count(forecast.steps)) * block_s
@@ -92,12 +97,14 @@ class StageBuilder:
         """Return the trip ahead from time step `step`; short_count is 0 after arrival."""
         n = self.settings.short_stages
         now = min(max(step, 0), self.steps)
-        fields = self._long_fields(now)
+        start = self._long_start(now)
+        fields = self._long_fields(start)
+        rises = self._cumulative_rises[:, self._block_end] - self._cumulative_rises[:, start]
         return Preview(
             self._demand_w[now : now + n],
             self._speed_mps[now : now + n],
             min(n, self.steps - now),
-            Stages(*fields),
+            Stages(*np.vstack([fields, rises.T.ravel()])),
         )
 
     def at(self, step: int) -> Stages:
@@ -112,14 +119,20 @@ class StageBuilder:
         fields[:, :seen] = _fields(trace, self._vehicle)
         long = preview.long
         fields[:, n:] = (long.duration_s, long.net_w, long.speed_mps, long.internal_off_w)
-        return Stages(*fields)
+        rises = np.zeros(self.count)
+        rises[:seen] = 1.0
+        rises[n:] = starts_per_rise(long.rises, self.settings)
+        return Stages(*np.vstack([fields, rises]))
 
-    def _long_fields(self, step: int) -> NDArray[np.float64]:
-        """Fields of the long stages; shape (FIELDS, blocks * classes)."""
+    def _long_start(self, step: int) -> NDArray[np.intp]:
+        """First second of each block beyond the short horizon; its end where there is none."""
         n_short = self.settings.short_stages
         arriving = step + n_short >= self.steps
         start = np.clip(step + n_short, self._block_start, self._block_end)
-        start = self._block_end if arriving else start
+        return self._block_end if arriving else start
+
+    def _long_fields(self, start: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Fields of the long stages, from those seconds on; shape (FIELDS, blocks * classes)."""
         # (classes, FIELDS, blocks) -> fields of the long stages, block by block, class by class
         sums = self._cumulative[:, :, self._block_end] - self._cumulative[:, :, start]
         fields = sums.transpose(1, 2, 0).reshape(FIELDS, -1)
@@ -173,3 +186,31 @@ def _cumulative(
     sums = np.zeros((classes, FIELDS, forecast.steps + 1))
     np.cumsum(fields[None] * member[:, None], axis=2, out=sums[:, :, 1:])
     return sums
+
+
+def _cumulative_rises(demand_class: NDArray[np.intp], classes: int) -> NDArray[np.float64]:
+    """Running count of the seconds that enter a class or pass it, from a lower demand.
+
+    Returns
+    -------
+    shape (classes, steps + 1)
+    """
+    before = np.concatenate([[classes - 1], demand_class[:-1]])  # departure is from the lowest
+    of = np.arange(classes)[:, None]
+    rises = (before > of) & (demand_class <= of)
+    sums = np.zeros((classes, len(demand_class) + 1))
+    np.cumsum(rises, axis=1, out=sums[:, 1:])
+    return sums
+
+
+def starts_per_rise(
+    rises: NDArray[np.float64], settings: HorizonSettings
+) -> NDArray[np.float64]:
+    """Rises into each class of a block as `Stages.rises`, for stages from hard down to braking.
+
+    A rise into a class starts the engine if it runs there and not below. The class below is the
+    next stage, in which the on-share falls by what it rises from there: hence the sign.
+    """
+    of_stage = np.zeros_like(rises).reshape(-1, settings.classes)
+    of_stage[:, 1:] = -settings.rise_share * rises.reshape(-1, settings.classes)[:, :-1]
+    return of_stage.ravel()

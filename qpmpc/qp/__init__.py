@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from qpmpc.qp.linearisation import Linearisation
-from qpmpc.qp.rows import VARS, Rows, Var
+from qpmpc.qp.rows import Rows, Table, Var, table_of
 from qpmpc.qp.scaling import Scaling, ScalingSettings
 from qpmpc.qp.stage_qp import QpData, QpSettings, StageQp
 from qpmpc.qp.structure import QpStructure
@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from qpmpc.qp.cvxpy_twin import CvxpyTwin
 
 __all__ = [
-    "VARS",
     "CvxpyTwin",
     "Linearisation",
     "QpData",
@@ -22,7 +21,9 @@ __all__ = [
     "Scaling",
     "ScalingSettings",
     "StageQp",
+    "Table",
     "Var",
+    "table_of",
 ]
 
 

@@ -15,7 +15,7 @@ from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.expressions import code_of
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.quantities import Quantities
-from qpmpc.qp.rows import ROWS, VARS, Entry, Row, Var, cost_terms, states
+from qpmpc.qp.rows import Entry, Row, Var, table_of
 from qpmpc.qp.scaling import Scaling, ScalingSettings
 from qpmpc.qp.stage_qp import QpSettings, qp_parameters
 from qpmpc.vehicle.parameters import Vehicle
@@ -33,6 +33,7 @@ UNIT = {
     Var.FUEL: 1.0,
     Var.INTERNAL: 10e3,
     Var.T_SLACK: 1.0,
+    Var.START: 1.0,
 }
 
 
@@ -63,25 +64,27 @@ class CvxpyTwin:
     ) -> None:
         self.vehicle, self.model, self.stages = vehicle, model, stages
         self.settings = settings or QpSettings()
+        self.table = table_of(vehicle.engine)
         numbers = qp_parameters(vehicle, model, self.settings, ScalingSettings())
         self._quantities = Quantities(numbers, vehicle, model, stages)
         self._parameters: list[tuple[Any, CodeType, int]] = []
-        self.variables = {var: cp.Variable(stages, name=var.name.lower()) for var in Var}
+        names = {var: var.name.lower() for var in self.table.variables}
+        self.variables = {var: cp.Variable(stages, name=name) for var, name in names.items()}
         x = {var: UNIT[var] * variable for var, variable in self.variables.items()}
         self.soc, self.t_cl_degc = x[Var.SOC], x[Var.T_CL]
         self.p_eng_w, self.on = x[Var.P_ENG], x[Var.ON]
         self.fuel_g_per_s, self.internal_w = x[Var.FUEL], x[Var.INTERNAL]
         self.t_slack_k = x[Var.T_SLACK]
         # the state now is a variable with one value, as products of parameters are not DPP
-        start = {state: cp.Variable(1, name=f"{state.name.lower()}_now") for state in states()}
-        self._now = {state: cp.Parameter(name=f"{state.name.lower()}_given") for state in start}
-        self._x: dict[Entry, Any] = {Entry(var, False): x[var] for var in Var}
+        start = {var: cp.Variable(1, name=f"{names[var]}_now") for var in self.table.coupling}
+        self._now = {var: cp.Parameter(name=f"{names[var]}_given") for var in start}
+        self._x: dict[Entry, Any] = {Entry(var, False): x[var] for var in x}
         for state, known in start.items():
             self._x[Entry(state, True)] = cp.hstack([UNIT[state] * known, x[state][:-1]])
-        self.rows = {row.name: self._constraints(row) for row in ROWS}
+        self.rows = {row.name: self._constraints(row) for row in self.table.rows}
         self.constraints = [self._x[Entry(s, True)][0] == now for s, now in self._now.items()]
         self.constraints += [part for parts in self.rows.values() for part in parts]
-        self._smoothing = {var: cp.Parameter(stages, nonneg=True) for var in Var}
+        self._smoothing = {var: cp.Parameter(stages, nonneg=True) for var in x}
         self.objective = cp.Minimize(self._cost())
         self.problem = cp.Problem(self.objective, self.constraints)
 
@@ -122,7 +125,7 @@ class CvxpyTwin:
     def _cost(self) -> Any:
         """Cost of all stages, with the small quadratic terms that are set."""
         cost: Any = 0.0
-        for entry, weight in cost_terms().items():
+        for entry, weight in self.table.cost.items():
             cost += cp.sum(cp.multiply(self._value(weight), self._x[entry]))
         for var, weights in self._smoothing.items():
             cost += 0.5 * cp.sum_squares(cp.multiply(weights, self.variables[var]))
@@ -137,6 +140,7 @@ class CvxpyTwin:
         soc: float,
         t_cl_degc: float,
         about: Linearisation,
+        engine_on: bool = False,
         scaling: Scaling | None = None,
     ) -> None:
         """Set the parameters for a horizon, a state and a linearisation point.
@@ -146,23 +150,26 @@ class CvxpyTwin:
         stages : the trip ahead, n stages
         soc, t_cl_degc : state at the start of the horizon
         about : linearisation point
+        engine_on : whether the engine runs now; read where starts cost something
         scaling : the regularisation of `StageQp` is defined in its solver units; with its scaling
             it is the same here, without it is zero
         """
-        self._now[Var.SOC].value, self._now[Var.T_CL].value = soc, t_cl_degc
-        self._quantities.update(stages, soc, about)
+        state = {Var.SOC: soc, Var.T_CL: t_cl_degc, Var.ON: 0.0}  # on: in the bound
+        for var, now in self._now.items():
+            now.value = state[var]
+        self._quantities.update(stages, soc, about, engine_on)
         for parameter, code, piece in self._parameters:
             parameter.value = self._of_piece(code, piece)
         self._smooth(scaling)
 
     def _smooth(self, scaling: Scaling | None) -> None:
-        weights = np.zeros((self.stages, VARS))
+        weights = np.zeros((self.stages, len(self.table.variables)))
         if scaling is not None:
             # 1/2 r z^2 of cost c x grams, with z = x / column
             size = self.settings.regularisation / scaling.cost
-            weights = np.sqrt(size) / scaling.column.reshape(-1, VARS)
-            weights[:, [Var.SOC, Var.T_CL]] = 0.0
-        for var in Var:
+            weights = np.sqrt(size) / scaling.column.reshape(weights.shape)
+            weights[:, self.table.states] = 0.0
+        for var in self.table.variables:
             self._smoothing[var].value = weights[:, var] * UNIT[var]
 
     def solve(self, solver: str = "CLARABEL", **options: Any) -> Floats:
@@ -174,7 +181,7 @@ class CvxpyTwin:
 
         Returns
         -------
-        x, shape (n, VARS), SI units, columns as in `Var`
+        x, shape (n, variables), SI units, columns as in `Var`
 
         Raises
         ------
@@ -188,4 +195,6 @@ class CvxpyTwin:
             raise QpmpcError(f"cvxpy twin: {solver}: {reason}") from error
         if self.problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
             raise QpmpcError(f"cvxpy twin: {solver} ends with {self.problem.status!r}")
-        return np.column_stack([np.asarray(self._x[Entry(var, False)].value) for var in Var])
+        return np.column_stack(
+            [np.asarray(self._x[Entry(var, False)].value) for var in self.table.variables]
+        )

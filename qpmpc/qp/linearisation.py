@@ -54,7 +54,7 @@ class Linearisation:
 
         Parameters
         ----------
-        x : solution, SI units, shape (n, VARS)
+        x : solution, SI units, shape (n, variables)
         t_cl_degc : coolant temperature at the start of the first stage
         layout : of the stages
         """

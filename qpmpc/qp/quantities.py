@@ -22,10 +22,10 @@ from qpmpc.vehicle.parameters import Vehicle
 Floats = NDArray[np.float64]
 
 # Changing from step to step: a stage, the point it is expanded about, the state now.
-STAGE = ("duration_s", "net_w", "speed_mps", "internal_off_w")
+STAGE = ("duration_s", "net_w", "speed_mps", "internal_off_w", "rises")
 ABOUT = ("t_cl_degc", "fuel_g_per_s", "p_eng_w", "t_cl_start_degc", "t_cl_end_degc")
 FLOOR = ("floor_degc", "highest_floor_degc")
-INPUTS = (*STAGE, *(f"about_{name}" for name in ABOUT), "start_soc", *FLOOR)
+INPUTS = (*STAGE, *(f"about_{name}" for name in ABOUT), "start_soc", "on_now", *FLOOR)
 ORIGIN = ("origin_soc", "origin_t_cl_degc")
 
 
@@ -89,7 +89,9 @@ class Quantities:
         """Whether a formula's value changes from step to step."""
         return not self._changing.isdisjoint(names_in(formula))
 
-    def update(self, stages: Stages, soc: float, about: Linearisation) -> dict[str, Any]:
+    def update(
+        self, stages: Stages, soc: float, about: Linearisation, engine_on: bool
+    ) -> dict[str, Any]:
         """Evaluate all quantities for a horizon, and return them by name."""
         names = self._names
         for name in STAGE:
@@ -97,6 +99,8 @@ class Quantities:
         for name in ABOUT:
             names[f"about_{name}"] = getattr(about, name)[:, None]
         floor = self._floor.at(stages, soc)
+        names["on_now"] = np.zeros((len(stages.duration_s), 1))
+        names["on_now"][0] = engine_on
         names["start_soc"], names["floor_degc"] = soc, floor[:, None]
         names["highest_floor_degc"] = floor.max()
         exec(self._each_step, names)

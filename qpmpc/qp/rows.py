@@ -7,20 +7,23 @@ stage the state now. Its coefficients are made from numbers of `qp_parameters`, 
 (`Stages`), the point it is expanded about (`Linearisation`), the pieces of the PWA curves, the
 constants below and QUANTITIES.
 
+`start`, its rows and its terms are there only for a vehicle whose engine starts cost something
+(`table_of`): where they cost nothing the QP is that without them, entry by entry.
+
 States count from an origin. In numpy that is 0; in C it is the state at the start of the horizon,
 because small numbers leave the digits of single precision to the changes within the plan.
 """
 
 import ast
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
 from typing import NamedTuple
 
 from qpmpc.qp.expressions import FormulaError, expression, terms_of
+from qpmpc.vehicle.parameters import Engine
 
 SHORTEST_SCALE_S = 1.0  # a masked stage is scaled as one of 1 s
-REACH_MARGIN_SOC = 1e-5
 ACCURATE_STAGE_S = 1.0  # a stage of this length or less is known, a longer one is forecast
 MOOT_G_PER_S = 5.0  # a bound on fuel that is never met
 SIGMA_FORCED = 0.99  # "engine must be on" as a lower bound on sigma, kept apart from the upper one
@@ -36,9 +39,7 @@ class Var(IntEnum):
     FUEL = 4  # F, mean fuel rate of a hot engine, g/s
     INTERNAL = 5  # G, mean internal battery power, W
     T_SLACK = 6  # K beyond the coolant limits
-
-
-VARS = len(Var)
+    START = 7  # u, starts of the engine in the stage
 
 
 class Variable(NamedTuple):
@@ -56,6 +57,7 @@ VARIABLES = {
     Var.FUEL: Variable("unit_fuel_g_per_s", is_rate=True),
     Var.INTERNAL: Variable("unit_power_w", is_rate=True),
     Var.T_SLACK: Variable("unit_t_k"),
+    Var.START: Variable("unit_start"),
 }
 
 QUANTITIES = """
@@ -70,7 +72,7 @@ waste_g_per_s = where(highest_floor_degc > t_min_degc, 0.0, MOOT_G_PER_S)
 # the way leads to: a limit above that is moot
 strongest_w = max(net_w - engine_max_w, -battery_charge_max_w)
 spent_soc = running(duration_s * pwa_battery(strongest_w) / battery_energy_j)
-reach_soc = start_soc - spent_soc - REACH_MARGIN_SOC
+reach_soc = start_soc - spent_soc - reach_margin_soc
 limit_soc = soc_min + where(duration_s > ACCURATE_STAGE_S, soc_reserve, 0.0)
 last_low_soc = where(soc_penalty_g > 0.0, limit_soc, terminal_soc_low)
 last_high_soc = where(soc_penalty_g > 0.0, soc_max, terminal_soc_high)
@@ -130,11 +132,13 @@ class Row:
     name : in Python, C and the docs
     text : `terms == bound`, `terms >= bound`, `terms <= bound` or `bound <= terms <= bound`
     pieces : the PWA curve (`fuel`, `battery`) with one row per piece; empty for a single row
+    left_out : variables whose terms this vehicle does not have
     """
 
     name: str
     text: str
     pieces: str = ""
+    left_out: frozenset[Var] = frozenset()
 
     @cached_property
     def _compared(self) -> tuple[ast.expr, ast.expr | None, ast.expr | None]:
@@ -153,7 +157,8 @@ class Row:
     @cached_property
     def terms(self) -> dict[Entry, ast.expr]:
         """Coefficient of each variable, in the order written."""
-        return _terms(self._compared[0])
+        terms = _terms(self._compared[0])
+        return {entry: factor for entry, factor in terms.items() if entry.var not in self.left_out}
 
     @property
     def low(self) -> ast.expr | None:
@@ -177,11 +182,17 @@ class Row:
 
 
 ROWS = (
-    Row("soc", "soc - soc_before + duration_s / battery_energy_j * internal == 0.0"),
+    Row(
+        "soc",
+        "soc - soc_before + duration_s / battery_energy_j * internal"
+        " + cranking_j / battery_energy_j * start == 0.0",
+    ),
     Row(
         "t_cl",
         "(1.0 + per_end) * t_cl + (per_end - per_start) * t_cl_before"
-        " + per_power * p_eng - per_fuel * fuel == settled_k",
+        " + per_power * p_eng - per_fuel * fuel"
+        " - per_power * lhv_j_per_g * start_fuel_g / max(duration_s, SHORTEST_SCALE_S) * start"
+        " == settled_k",
     ),
     Row("fuel", "fuel - fuel_slope * p_eng - fuel_intercept * on >= 0.0", "fuel"),
     Row("fuel_most", "fuel - fuel_chord_g_per_j * p_eng - fuel_idle_g_per_s * on <= waste_g_per_s"),
@@ -198,22 +209,76 @@ ROWS = (
     Row("t_cl_min", "t_cl + t_slack >= floor_degc - origin_t_cl_degc"),
     Row("t_cl_max", "t_cl - t_slack <= t_max_degc - origin_t_cl_degc"),
     Row("box_slack", "t_slack >= 0.0"),
+    Row("start", "start - rises * on + rises * on_before >= -rises * on_now"),
+    Row("box_start", "start >= 0.0"),
 )
+OF_START = ("start", "box_start")
 
-# Cost of a stage in g: fuel as expanded, at the mean of the stage's ends, and slack.
+# Cost of a stage in g: fuel as expanded, at the mean of the stage's ends, slack and starts.
 COST = (
     "duration_s * alpha * fuel + growing * t_cl + growing * t_cl_before + slack_g_per_k * t_slack"
+    " + start_fuel_g * start"
 )
 
 
-def cost_terms() -> dict[Entry, ast.expr]:
-    """Weight of each variable in the cost of a stage."""
-    return _terms(expression(COST))
+@dataclass(frozen=True)
+class Table:
+    """The part of the table that a vehicle has.
+
+    Parameters
+    ----------
+    start_fuel, start_energy : whether a start takes fuel, and energy from the battery
+
+    Attributes
+    ----------
+    has_start : whether a start costs anything, so that there is a variable for it
+    variables : of a stage, in their order in x
+    rows : of a stage, in their order in A
+    """
+
+    start_fuel: bool = False
+    start_energy: bool = False
+
+    @property
+    def has_start(self) -> bool:
+        """Whether a start costs anything."""
+        return self.start_fuel or self.start_energy
+
+    @cached_property
+    def variables(self) -> tuple[Var, ...]:
+        """Variables of a stage."""
+        return tuple(var for var in Var if self.has_start or var is not Var.START)
+
+    @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """Rows of a stage."""
+        free = frozenset({Var.START})
+        out = {"soc": not self.start_energy, "t_cl": not self.start_fuel}
+        kept = (row for row in ROWS if self.has_start or row.name not in OF_START)
+        return tuple(replace(row, left_out=free) if out.get(row.name) else row for row in kept)
+
+    @property
+    def cost(self) -> dict[Entry, ast.expr]:
+        """Weight of each variable in the cost of a stage."""
+        terms = _terms(expression(COST))
+        return {e: w for e, w in terms.items() if self.start_fuel or e.var is not Var.START}
+
+    @property
+    def coupling(self) -> list[Var]:
+        """Variables that a row of the next stage contains."""
+        return [
+            var for var in self.variables if any(Entry(var, True) in r.terms for r in self.rows)
+        ]
+
+    @property
+    def states(self) -> list[Var]:
+        """Those that are states: known now, and counted from an origin."""
+        return [var for var in self.coupling if not VARIABLES[var].is_rate]
 
 
-def states() -> list[Var]:
-    """Variables that a row of the next stage contains: they couple the stages."""
-    return [var for var in Var if any(Entry(var, True) in row.terms for row in ROWS)]
+def table_of(engine: Engine) -> Table:
+    """Return the table of a vehicle with this engine."""
+    return Table(engine.start_fuel_g > 0.0, engine.start_energy_j > 0.0)
 
 
 class Rows:
@@ -221,6 +286,7 @@ class Rows:
 
     Parameters
     ----------
+    table : of the vehicle
     fuel, battery : pieces of the PWA curves
 
     Attributes
@@ -228,11 +294,12 @@ class Rows:
     count : rows of a stage
     """
 
-    def __init__(self, fuel: int, battery: int) -> None:
+    def __init__(self, table: Table, fuel: int, battery: int) -> None:
+        self.table = table
         self._pieces = {"": 1, "fuel": fuel, "battery": battery}
         self._place: dict[str, slice] = {}
         self.count = 0
-        for row in ROWS:
+        for row in table.rows:
             first, self.count = self.count, self.count + self._pieces[row.pieces]
             self._place[row.name] = slice(first, self.count)
 

@@ -15,8 +15,8 @@ class ScalingSettings(BaseModel):
 
     Attributes
     ----------
-    power_w, fuel_g_per_s, t_cl_k : one solver unit of each quantity; within a factor of some
-        thousand of its size, beyond which no solver converges
+    power_w, fuel_g_per_s, t_cl_k, starts : one solver unit of each quantity; within a factor of
+        some thousand of its size, beyond which no solver converges
     energy_j : one solver unit of SOC, as battery energy
     duration_exponent : a stage's rates are counted in units / h^exponent, so that a long stage's
         variables, which weigh more, are resolved finer; 1 makes them energies, 0 plain rates
@@ -28,6 +28,7 @@ class ScalingSettings(BaseModel):
     fuel_g_per_s: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0
     energy_j: Annotated[float, Field(ge=40.0, le=40e6)] = 40e3
     t_cl_k: Annotated[float, Field(ge=1e-3, le=1e3)] = 2.0
+    starts: Annotated[float, Field(ge=1e-3, le=1e3)] = 0.2
     duration_exponent: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
 
 

@@ -15,13 +15,14 @@ from qpmpc.qp.expressions import code_of, expression
 from qpmpc.qp.heat_reserve import heat_reserve_k
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.quantities import Quantities
-from qpmpc.qp.rows import ROWS, SHORTEST_SCALE_S, VARIABLES, VARS, Rows, Var, cost_terms, states
+from qpmpc.qp.rows import SHORTEST_SCALE_S, VARIABLES, Rows, Var, table_of
 from qpmpc.qp.scaling import Scaling, ScalingSettings
 from qpmpc.qp.structure import QpStructure
 from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
 
+REACH_MARGIN_SOC = 1e-5
 T_CL_MAX_MARGIN_K = 0.05  # small: the radiator is fully open only at the limit itself
 LEAST_COST = 1e-9  # of any fuel entry: where all stages are masked the cost is scaled by this
 
@@ -93,6 +94,7 @@ def qp_parameters(
             f"soc_max={battery.soc_max:g}, leave no terminal SOC: {soc_low:g} is above "
             f"{soc_high:g}"
         )
+    crank_j = cranking_j(vehicle, model)
     # the chord of the fuel curve, from idling to full power
     idle, full = (
         float((model.fuel.slope * power + model.fuel.intercept).max())
@@ -102,6 +104,8 @@ def qp_parameters(
         "engine_max_w": engine.power_max_w,
         "engine_min_w": engine.power_min_w,
         "lhv_j_per_g": engine.lhv_j_per_g,
+        "start_fuel_g": engine.start_fuel_g,
+        "cranking_j": crank_j,
         "fuel_idle_g_per_s": idle,
         "fuel_chord_g_per_j": (full - idle) / engine.power_max_w,
         **{name: float(value) for name, value in thermal.model_dump().items()},
@@ -113,6 +117,7 @@ def qp_parameters(
         "soc_init": trip.soc_init,
         # of stages of more than 1 s, above soc_min
         "soc_reserve": settings.soc_reserve * max(trip.soc_init - battery.soc_min, 0.0),
+        "reach_margin_soc": REACH_MARGIN_SOC + crank_j / model.battery_energy_j,
         "terminal_soc_low": soc_low,
         "terminal_soc_high": soc_high,
         "soc_penalty_g": settings.soc_penalty_g,
@@ -126,7 +131,20 @@ def qp_parameters(
         "unit_t_k": units.t_cl_k,
         "unit_power_w": units.power_w,
         "unit_fuel_g_per_s": units.fuel_g_per_s,
+        "unit_start": units.starts,
     }
+
+
+def cranking_j(vehicle: Vehicle, model: PwaModel) -> float:
+    """Energy that a start takes out of the battery's store.
+
+    l(P_aux + E / 1 s) - l(P_aux) for 1 s, with E the energy that cranks the engine and l the
+    fitted curve of internal power: as if the car stood. At the power of driving the loss is
+    another, by a tenth of E at most.
+    """
+    aux_w = vehicle.battery.aux_power_w
+    with_start, without = model.battery(np.array([aux_w + vehicle.engine.start_energy_j, aux_w]))
+    return float(with_start - without)
 
 
 class StageQp:
@@ -153,7 +171,8 @@ class StageQp:
         scaling: ScalingSettings,
     ) -> None:
         self.vehicle, self.model, self.settings, self.units = vehicle, model, settings, scaling
-        self.rows = Rows(fuel=model.fuel.pieces, battery=model.battery.pieces)
+        self.table = table_of(vehicle.engine)
+        self.rows = Rows(self.table, fuel=model.fuel.pieces, battery=model.battery.pieces)
         self.structure = QpStructure(stages, self.rows)
         self.stages = stages
         parameters = qp_parameters(vehicle, model, settings, scaling)
@@ -164,21 +183,22 @@ class StageQp:
         self._each_step = self._fill_constants()
         self._before = [
             (self.rows[row.name], self.structure.places(row, entry), entry.var)
-            for row in ROWS
+            for row in self.table.rows
             for entry in row.terms
             if entry.before
         ]
-        self._weights = [(entry, code_of(factor)) for entry, factor in cost_terms().items()]
-        self._hessian = np.full((stages, VARS), settings.regularisation)
-        self._hessian[:, states()] = 0.0
-        units = [expression(variable.unit) for variable in VARIABLES.values()]
+        self._weights = [(entry, code_of(factor)) for entry, factor in self.table.cost.items()]
+        variables = self.table.variables
+        self._hessian = np.full((stages, len(variables)), settings.regularisation)
+        self._hessian[:, self.table.states] = 0.0
+        units = [expression(VARIABLES[var].unit) for var in variables]
         self._unit = np.array([self._quantities.value(code_of(unit)) for unit in units])
-        self._is_rate = np.array([variable.is_rate for variable in VARIABLES.values()])
+        self._is_rate = np.array([VARIABLES[var].is_rate for var in variables])
 
     def _fill_constants(self) -> list[tuple[Floats, CodeType]]:
         """Fill in the constant entries; return the places and formulas of the others."""
         structure, each_step = self.structure, []
-        for row in ROWS:
+        for row in self.table.rows:
             place = self.rows[row.name]
             for entry, factor in row.terms.items():
                 values = self._values[:, structure.places(row, entry)]
@@ -193,7 +213,14 @@ class StageQp:
                     bounds[:, place] = self._quantities.value(code_of(bound))
         return each_step
 
-    def update(self, stages: Stages, soc: float, t_cl_degc: float, about: Linearisation) -> QpData:
+    def update(
+        self,
+        stages: Stages,
+        soc: float,
+        t_cl_degc: float,
+        about: Linearisation,
+        engine_on: bool = False,
+    ) -> QpData:
         """Compute all values for a horizon, a state and a linearisation point.
 
         Parameters
@@ -201,17 +228,18 @@ class StageQp:
         stages : the trip ahead, n stages
         soc, t_cl_degc : state at the start of the horizon
         about : linearisation point
+        engine_on : whether the engine runs now; read where starts cost something
 
         Returns
         -------
         `QpData` in solver units, with the `Scaling` that leads back
         """
         value = self._quantities.value
-        self._quantities.update(stages, soc, about)
+        self._quantities.update(stages, soc, about, engine_on)
         for place, formula in self._each_step:
             place[:] = value(formula)
-        self._start_at({Var.SOC: soc, Var.T_CL: t_cl_degc})
-        cost = np.zeros((self.stages, VARS))
+        self._start_at({Var.SOC: soc, Var.T_CL: t_cl_degc, Var.ON: 0.0})  # on: in the bound
+        cost = np.zeros((self.stages, len(self.table.variables)))
         for entry, weight in self._weights:
             if entry.before:
                 cost[:-1, [entry.var]] += np.broadcast_to(value(weight), (self.stages, 1))[1:]

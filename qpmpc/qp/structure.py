@@ -4,7 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from qpmpc.qp.rows import ROWS, VARS, Entry, Row, Rows
+from qpmpc.qp.rows import Entry, Row, Rows
 
 
 class QpStructure:
@@ -18,13 +18,18 @@ class QpStructure:
     ----------
     stages : n
     rows : row layout
+
+    Attributes
+    ----------
+    variables : of a stage
     """
 
     def __init__(self, stages: int, rows: Rows) -> None:
         self.stages = stages
         self.rows = rows
+        self.variables = len(rows.table.variables)
         self.index: dict[tuple[int, Entry], int] = {}
-        for row in ROWS:
+        for row in rows.table.rows:
             for i in range(rows[row.name].start, rows[row.name].stop):
                 self.index |= {(i, entry): len(self.index) + e for e, entry in enumerate(row.terms)}
         self.entry_row = np.array([row for row, _ in self.index])
@@ -33,7 +38,7 @@ class QpStructure:
         self.entry_start = np.flatnonzero(np.diff(self.entry_row, prepend=-1))
         k = np.arange(stages)[:, None]
         row = k * rows.count + self.entry_row
-        column = (k - self.entry_before) * VARS + self.entry_var
+        column = (k - self.entry_before) * self.variables + self.entry_var
         present = np.broadcast_to(column >= 0, row.shape) & ~((k == 0) & self.entry_before)
         position = np.arange(row.size).reshape(row.shape)
         order = sp.coo_matrix(
@@ -46,7 +51,7 @@ class QpStructure:
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns of A."""
-        return self.stages * self.rows.count, self.stages * VARS
+        return self.stages * self.rows.count, self.stages * self.variables
 
     def places(self, row: Row, entry: Entry) -> slice:
         """Columns of an entry in the array of entries, one for each piece of its row."""

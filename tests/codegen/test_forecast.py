@@ -77,6 +77,7 @@ def assert_same_inputs(
         ours.fill(observed(truth, step), have)
         assert have.short_count == want.short_count
         assert list(have.long_duration_s) == list(want.long_duration_s)
+        assert list(have.long_rises) == list(want.long_rises)
         for names, absolute in ((POWERS, power_w), (SPEEDS, speed_mps)):
             np.testing.assert_allclose(
                 numbers(have, names), numbers(want, names), rtol=relative, atol=absolute

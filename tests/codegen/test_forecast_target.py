@@ -108,6 +108,7 @@ def test_cost_on_the_target_is_as_documented_and_does_not_grow_with_the_trip(tmp
     for step, have in enumerate(inputs):
         python.fill(Observation(step, 0.6, 50.0, False, 0.0, 0.0), want)
         assert list(have["long_duration_s"]) == list(want.long_duration_s)
+        assert list(have["long_rises"]) == list(want.long_rises)
         assert have["short_count"] == want.short_count
         for name, absolute in (("net_w", 0.01), ("internal_off_w", 0.01), ("speed_mps", 1e-5)):
             np.testing.assert_allclose(

@@ -6,6 +6,7 @@ import math
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.errors import InputError
 from qpmpc.preview import StageBuilder
-from qpmpc.preview.stages import Preview, Stages
+from qpmpc.preview.stages import Preview
 from qpmpc.registry import make_controller
 from qpmpc.simulation import simulate
 from qpmpc.solvers import base
@@ -183,6 +184,8 @@ BAD = [
     ({"long_net_w": (20, math.nan)}, BAD_PREVIEW),
     ({"long_speed_mps": (3, math.inf)}, BAD_PREVIEW),
     ({"long_internal_off_w": (3, math.nan)}, BAD_PREVIEW),
+    ({"long_rises": (3, -1.0)}, BAD_PREVIEW),
+    ({"long_rises": (3, math.nan)}, BAD_PREVIEW),
     ({"short_count": 0}, BAD_PREVIEW),
     ({"short_count": 21}, BAD_PREVIEW),
     ({"soc": math.nan, "short_count": -(2**31)}, BAD_MEASUREMENT | BAD_PREVIEW),
@@ -295,7 +298,12 @@ def far_more_of_the_same(preview: Preview) -> Preview:
     long = preview.long
     full = np.full_like(long.net_w, VEHICLE.engine.power_max_w)
     return preview._replace(
-        long=Stages(np.full_like(full, 1e5), full, long.speed_mps, np.full_like(full, 2e4))
+        long=replace(
+            long,
+            duration_s=np.full_like(full, 1e5),
+            net_w=full,
+            internal_off_w=np.full_like(full, 2e4),
+        )
     )
 
 
@@ -346,9 +354,7 @@ def test_a_new_route_is_taken_from_its_second_second_on() -> None:
 
 def _longer(preview: Preview, factor: float) -> Preview:
     long = preview.long
-    return preview._replace(
-        long=Stages(factor * long.duration_s, long.net_w, long.speed_mps, long.internal_off_w)
-    )
+    return preview._replace(long=replace(long, duration_s=factor * long.duration_s))
 
 
 def test_when_solves_fail_again_and_again_both_start_cold(monkeypatch) -> None:

@@ -160,9 +160,10 @@ def test_generated_project_builds_by_its_makefile(tmp_path, files) -> None:
 
 
 def test_pattern_has_the_entries_that_the_adapter_counts() -> None:
-    sizes = numbers().sizes
+    values = numbers()
+    sizes = values.sizes
     pieces = sizes.fuel_pieces + sizes.battery_pieces
-    assert matrix_pattern(sizes).nnz == sizes.stages * (3 * pieces + 21) - 2
+    assert matrix_pattern(values).nnz == sizes.stages * (3 * pieces + 21) - 2
 
 
 def test_numbers_too_small_for_what_osqp_generates_are_refused() -> None:

@@ -17,11 +17,12 @@ from qpmpc.codegen.rows.stage_c import FUNCTIONS, types_h, values_h
 from qpmpc.codegen.values import values_of
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.qp.expressions import FormulaError, code_of, expression
-from qpmpc.qp.rows import ROWS, VARS, Entry, Row, Rows, Var
+from qpmpc.qp.rows import Entry, Row, Rows, Table, Var
 from qpmpc.qp.structure import QpStructure
 from qpmpc.vehicle import load_vehicle
 
 FUEL, BATTERY = 3, 4
+TABLES = [Table(), Table(True, False), Table(False, True), Table(True, True)]
 
 
 def values():
@@ -37,11 +38,14 @@ def numbers(text: str) -> dict[str, int]:
     return found
 
 
-def test_python_and_c_number_variables_rows_and_entries_alike() -> None:
-    found, rows = numbers(types_h()), Rows(fuel=FUEL, battery=BATTERY)
-    assert {f"MPC_VAR_{var.name}": var.value for var in Var}.items() <= found.items()
-    assert {f"MPC_ROW_{r.name.upper()}": rows.first(r.name) for r in ROWS}.items() <= found.items()
-    assert (found["MPC_VARS"], found["MPC_ROWS"]) == (VARS, rows.count)
+@pytest.mark.parametrize("table", TABLES)
+def test_python_and_c_number_variables_rows_and_entries_alike(table) -> None:
+    found, rows = numbers(types_h(table)), Rows(table, fuel=FUEL, battery=BATTERY)
+    variables = {f"MPC_VAR_{var.name}": var.value for var in table.variables}
+    assert {name: found[name] for name in found if name.startswith("MPC_VAR_")} == variables
+    places = {f"MPC_ROW_{row.name.upper()}": rows.first(row.name) for row in table.rows}
+    assert {name: found[name] for name in found if name.startswith("MPC_ROW_")} == places
+    assert (found["MPC_VARS"], found["MPC_ROWS"]) == (len(variables), rows.count)
     structure = QpStructure(3, rows)
     assert found["MPC_ENTRIES"] == len(structure.index)
     assert found["MPC_ENTRIES_BEFORE"] == structure.entry_before.sum()
@@ -88,15 +92,15 @@ def test_c_has_the_value_of_the_formula_to_the_last_bit() -> None:
 
 
 @settings(max_examples=30, deadline=None)
-@given(seed=st.integers(0, 10**6), stages=st.integers(1, 4))
-def test_the_factor_has_every_entry_that_elimination_makes(seed, stages) -> None:
+@given(seed=st.integers(0, 10**6), stages=st.integers(1, 4), table=st.sampled_from(TABLES))
+def test_the_factor_has_every_entry_that_elimination_makes(seed, stages, table) -> None:
     """Dense Cholesky of A'A + I with random entries, in the order of elimination."""
-    rows = Rows(fuel=FUEL, battery=BATTERY)
-    structure, e = QpStructure(stages, rows), Elimination()
+    rows, variables = Rows(table, fuel=FUEL, battery=BATTERY), len(table.variables)
+    structure, e = QpStructure(stages, rows), Elimination.shortest(table)
     rng = np.random.default_rng(seed)
     a = structure.matrix_of(structure.data(rng.uniform(0.5, 1.5, (stages, len(structure.index)))))
     own = [entry.var for entry in e.own()]
-    order = np.add.outer(np.arange(stages) * VARS, own).ravel()
+    order = np.add.outer(np.arange(stages) * variables, own).ravel()
     normal = (a.T @ a).toarray()[np.ix_(order, order)] + np.eye(len(order))
     factor = np.abs(np.linalg.cholesky(normal)) > 1e-9
     expected = np.eye(len(order), dtype=bool)
@@ -104,16 +108,17 @@ def test_the_factor_has_every_entry_that_elimination_makes(seed, stages) -> None
         for before in (True, False) if k else (False,):
             for row, column in e.factors(before):
                 i, j = own.index(row.var), own.index(column.var)
-                expected[k * VARS + i, (k - before) * VARS + j] = True
+                expected[k * variables + i, (k - before) * variables + j] = True
     assert not (factor & ~expected).any()
-    assert expected.sum() - factor.sum() <= VARS  # nothing but fill of the first stage more
+    assert expected.sum() - factor.sum() <= variables  # nothing but fill of the first stage more
 
 
-def test_a_new_variable_and_row_need_no_edit_of_the_factor(monkeypatch) -> None:
+def test_a_new_variable_and_row_need_no_edit_of_the_factor() -> None:
     """A row more, with entries that no other has: its place in the factor is found."""
     row = Row("extra", "internal + soc_before - 2.0 * t_slack <= 5.0")
-    monkeypatch.setattr("qpmpc.codegen.rows.elimination.ROWS", (*ROWS, row))
-    e = Elimination()
+    table = Table()
+    table.__dict__["rows"] = (*table.rows, row)
+    e = Elimination(table, table.coupling)
     slack, internal = Entry(Var.T_SLACK, False), Entry(Var.INTERNAL, False)
     assert e.pair(slack, internal) in {e.pair(*pair) for pair in e.factors(before=False)}
     assert (slack, Entry(Var.SOC, True)) in e.factors(before=True)
@@ -126,4 +131,4 @@ def test_names_and_constructs_that_c_does_not_have_are_refused() -> None:
         with pytest.raises(FormulaError):
             writer.expression(expression(text))
     with pytest.raises(FormulaError):
-        values_h(["t_amb_degc"])  # the other parameters are unknown
+        values_h(Table(), ["t_amb_degc"])  # the other parameters are unknown

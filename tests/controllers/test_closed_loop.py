@@ -37,6 +37,24 @@ def test_mh_qp_saves_against_the_rules(runs, cycle, saving):
     assert mpc.fuel_soc_balanced_g <= (1.0 - saving) * rules.fuel_soc_balanced_g
 
 
+@pytest.mark.parametrize(
+    "starts",
+    [{"engine.start_fuel_g": 0.3}, {"engine.start_fuel_g": 0.2, "engine.start_energy_j": 4e3}],
+)
+def test_starts_that_cost_something_are_planned(runs, starts):
+    """Half the starts for less fuel than the plan that knows of none; alike in Python and C."""
+    blind = runs["nycc", "mh-qp"]
+    seeing = simulate("nycc", "mh-qp", settings=starts)
+    engine, trip = seeing.vehicle.engine, seeing.vehicle.trip
+    price_g = engine.start_fuel_g + engine.start_energy_j / (trip.eta_eq * engine.lhv_j_per_g)
+    same = simulate("nycc", "mh-qp", settings={**starts, "mh_qp.implementation": "python"})
+    assert 0 < seeing.trajectory.started.sum() <= 0.6 * blind.trajectory.started.sum()
+    blindly_g = blind.fuel_soc_balanced_g + price_g * blind.trajectory.started.sum()
+    assert seeing.fuel_soc_balanced_g < 0.98 * blindly_g
+    assert seeing.summary()["violations"] == NO_VIOLATION
+    assert same.trajectory.p_eng_w == pytest.approx(seeing.trajectory.p_eng_w, abs=0.1)
+
+
 def test_no_limit_is_violated_and_no_fallback_is_used(runs):
     for run in runs.values():
         summary = run.summary()

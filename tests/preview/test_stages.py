@@ -62,6 +62,35 @@ def test_long_stages_hold_their_demand_class():
         assert np.all(demand[there] <= high + 1e-9)
 
 
+@settings(max_examples=60, deadline=None)
+@given(step=st.integers(0, NYCC.steps - 1), short=st.integers(1, 30), blocks=st.integers(1, 40))
+def test_rises_are_those_of_the_demand_beyond_the_short_horizon(step, short, blocks):
+    layout = HorizonSettings(short_stages=short, blocks=blocks)
+    builder = StageBuilder(VEHICLE, NYCC, NYCC, layout)
+    found = builder.preview(step).long.rises.reshape(blocks, 3)
+    length = layout.block_length_s(NYCC.steps)
+    demand = NYCC.demand_w
+    for block in range(blocks):
+        inside = range(max(step + short, block * length), min((block + 1) * length, NYCC.steps))
+        inside = inside if step + short < NYCC.steps else range(0)
+        hard = sum(demand[t - 1] <= layout.class_hard_w < demand[t] for t in inside)
+        easy = sum(demand[t - 1] < layout.class_braking_w <= demand[t] for t in inside)
+        assert list(found[block]) == [hard, easy, 0.0]
+    stages = builder.at(step)
+    counted = min(short, NYCC.steps - step)
+    np.testing.assert_array_equal(stages.rises[:counted], 1.0)
+    np.testing.assert_array_equal(stages.rises[counted:short], 0.0)
+    of_class = stages.rises[short:].reshape(blocks, 3)
+    # what rises from the easy to the hard seconds falls from the hard stage to the easy one
+    np.testing.assert_array_equal(of_class[:, 0], 0.0)
+    np.testing.assert_array_equal(of_class[:, 1:], -layout.rise_share * found[:, :2])
+
+
+def test_an_averaged_preview_knows_no_rises():
+    builder = StageBuilder(VEHICLE, NYCC, NYCC, HorizonSettings(classes=1))
+    assert not builder.at(0).rises[builder.settings.short_stages :].any()
+
+
 def test_the_forecast_fills_the_long_horizon_only():
     twice = Trace(2.0 * NYCC.demand_w, NYCC.speed_mps)
     builder = StageBuilder(VEHICLE, NYCC, twice, HorizonSettings())

@@ -1,6 +1,7 @@
 """The table of rows: what it says is the model; what it cannot say is refused; docs show it."""
 
 import ast
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from qpmpc.pwa import PwaModel
 from qpmpc.qp import Linearisation, QpSettings, ScalingSettings, StageQp, Var
 from qpmpc.qp.expressions import FormulaError, code_of, expression, parsed, terms_of
 from qpmpc.qp.quantities import INPUTS, ORIGIN
-from qpmpc.qp.rows import COST, ROWS, VARIABLES, Entry, Row, Rows, cost_terms, states
+from qpmpc.qp.rows import COST, ROWS, VARIABLES, Entry, Row, Rows, Table, table_of
 from qpmpc.qp.rows import QUANTITIES as LINES
 from qpmpc.qp.stage_qp import qp_parameters
 from qpmpc.vehicle import load_vehicle
@@ -22,28 +23,29 @@ from qpmpc.verification.independent.equations import Equations
 CAR = load_vehicle()
 MODEL = PwaModel.of(CAR)
 EQUATIONS = Equations(CAR)
+STARTING = CAR.with_settings({"engine.start_fuel_g": 0.3, "engine.start_energy_j": 4e3})
 DOCS = Path(__file__).parents[2] / "docs" / "qp.md"
 
 
-def in_si_units(stages: Stages, about: Linearisation, soc: float, t_cl_degc: float):
+def in_si_units(stages, about, soc, t_cl_degc, car=CAR, engine_on=False):
     """Rows of the QP in SI units as (stages, rows, stages, variables), and their bounds."""
     n = len(stages.duration_s)
-    qp = StageQp(CAR, MODEL, n, QpSettings(), ScalingSettings())
-    data = qp.update(stages, soc, t_cl_degc, about)
+    qp = StageQp(car, MODEL, n, QpSettings(), ScalingSettings())
+    data = qp.update(stages, soc, t_cl_degc, about, engine_on)
     a = qp.structure.matrix_of(data.a_data).toarray()
     a /= data.scaling.row[:, None] * data.scaling.column
     shape = n, qp.rows.count
     lower, upper = (
         b.reshape(shape) for b in (data.lower / data.scaling.row, data.upper / data.scaling.row)
     )
-    return a.reshape(*shape, n, len(Var)), lower, upper, qp.rows
+    return a.reshape(*shape, n, -1), lower, upper, qp.rows
 
 
 def two_stages(h, net_w, speed_mps, t_degc, fuel, power):
     """The same stage twice, expanded about one point; the second has a stage before it."""
     pair = np.ones(2)
     off_w = EQUATIONS.internal_w(CAR.trip.soc_init, net_w)
-    stages = Stages(h * pair, net_w * pair, speed_mps * pair, float(off_w) * pair)
+    stages = Stages(h * pair, net_w * pair, speed_mps * pair, float(off_w) * pair, pair)
     at = t_degc * pair
     return stages, Linearisation(at, fuel * pair, power * pair, at, at)
 
@@ -91,7 +93,7 @@ def test_other_rows_hold_exactly_where_the_model_allows(h, net_w, data):
     """Fuel, battery and power limits at points of the model: slack of each piece, by hand."""
     stages, about = two_stages(h, net_w, 10.0, 60.0, 0.5, 8e3)
     a, lower, upper, rows = in_si_units(stages, about, 0.6, 60.0)
-    x = np.zeros((2, len(Var)))
+    x = np.zeros((2, a.shape[-1]))
     x[0, Var.SOC] = data.draw(st.floats(0.4, 0.8))
     on = x[1, Var.ON] = data.draw(st.floats(0.0, 1.0))
     power = x[1, Var.P_ENG] = on * data.draw(st.floats(0.0, 50e3))
@@ -115,8 +117,8 @@ def test_other_rows_hold_exactly_where_the_model_allows(h, net_w, data):
 
 
 def test_every_name_of_the_table_is_known() -> None:
-    numbers = qp_parameters(CAR, MODEL, QpSettings(), ScalingSettings())
-    qp = StageQp(CAR, MODEL, 2, QpSettings(), ScalingSettings())
+    numbers = qp_parameters(STARTING, MODEL, QpSettings(), ScalingSettings())
+    qp = StageQp(STARTING, MODEL, 2, QpSettings(), ScalingSettings())
     known = qp._quantities._names.keys() | set(INPUTS) | set(ORIGIN) | numbers.keys()
     known |= {t.id for line in parsed(LINES) for t in ast.walk(line) if isinstance(t, ast.Name)}
     assert {variable.unit for variable in VARIABLES.values()} - {"1.0"} <= numbers.keys()
@@ -127,8 +129,62 @@ def test_every_name_of_the_table_is_known() -> None:
             )
             assert names <= known, row.name
     assert set(VARIABLES) == set(Var)
-    assert states() == [Var.SOC, Var.T_CL]
-    assert {entry.var for entry in cost_terms()} == {Var.FUEL, Var.T_CL, Var.T_SLACK}
+    free, starting = table_of(CAR.engine), table_of(STARTING.engine)
+    assert free.states == starting.states == free.coupling == [Var.SOC, Var.T_CL]
+    assert starting.coupling == [Var.SOC, Var.T_CL, Var.ON]
+    cost = {Var.FUEL, Var.T_CL, Var.T_SLACK}
+    assert {entry.var for entry in free.cost} == cost
+    assert {entry.var for entry in starting.cost} == cost | {Var.START}
+
+
+def test_an_engine_that_starts_at_no_cost_has_no_trace_of_starts() -> None:
+    free = table_of(CAR.engine)
+    assert free.variables == tuple(Var)[:-1]
+    assert [row.name for row in free.rows] == [row.name for row in ROWS][:-2]
+    assert all(entry.var is not Var.START for row in free.rows for entry in row.terms)
+
+
+@pytest.mark.parametrize(
+    ("fuel", "energy", "rows"),
+    [(True, False, {"t_cl"}), (False, True, {"soc"}), (True, True, {"t_cl", "soc"})],
+)
+def test_a_start_is_in_the_rows_of_what_it_takes(fuel, energy, rows) -> None:
+    table, start = Table(fuel, energy), Entry(Var.START, False)
+    assert {row.name for row in table.rows if start in row.terms} == rows | {"start", "box_start"}
+    assert (start in table.cost) is fuel
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    h=st.floats(1.0, 120.0),
+    rises=st.floats(-20.0, 20.0),
+    shares=st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)),
+    engine_on=st.booleans(),
+)
+def test_starts_are_what_the_on_share_rises_and_take_fuel_heat_and_charge(
+    h, rises, shares, engine_on
+) -> None:
+    stages, about = two_stages(h, 5e3, 10.0, 60.0, 0.5, 8e3)
+    stages = replace(stages, rises=np.array([1.0, rises]))
+    a, lower, _, rows = in_si_units(stages, about, 0.6, 60.0, STARTING, engine_on)
+    x = np.zeros((2, len(Var)))
+    x[:, Var.ON] = shares
+    left = np.einsum("krlv,lv->kr", a, x)
+    row = rows.first("start")
+    least = (lower - left)[:, row]  # of START
+    expected = [shares[0] - engine_on, rises * (shares[1] - shares[0])]
+    assert least == pytest.approx(expected, abs=1e-9)
+    np.testing.assert_allclose(a[1, [row, rows.first("box_start")], 1, Var.START], 1.0)
+    # against the equations: 0.3 g burnt within the stage, 4 kJ and their loss out of the store
+    thermal, engine = CAR.thermal, STARTING.engine
+    heat_j = (1.0 - thermal.exhaust_share) * engine.start_fuel_g * engine.lhv_j_per_g
+    t_cl = a[1, rows.first("t_cl"), 1]
+    per_w = t_cl[Var.P_ENG] / (1.0 - thermal.exhaust_share)
+    assert t_cl[Var.START] == pytest.approx(-per_w * heat_j / h)
+    taken_j = a[1, rows.first("soc"), 1, Var.START] * MODEL.battery_energy_j
+    aux_w, soc = CAR.battery.aux_power_w, CAR.trip.soc_init
+    drawn = EQUATIONS.internal_w(soc, np.array([aux_w, aux_w + engine.start_energy_j]))
+    assert taken_j == pytest.approx(drawn[1] - drawn[0], rel=0.02)  # the curve is fitted
 
 
 @pytest.mark.parametrize(
@@ -176,7 +232,7 @@ def test_terms_keep_signs_and_order() -> None:
 
 
 def test_rows_follow_each_other_with_their_pieces() -> None:
-    rows = Rows(fuel=5, battery=8)
+    rows = Rows(Table(True, True), fuel=5, battery=8)
     places = [i for row in ROWS for i in range(rows.count)[rows[row.name]]]
     assert places == list(range(rows.count))
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from qpmpc.cycles import load_cycle
 from qpmpc.preview import HorizonSettings, StageBuilder, Stages, Trace
 from qpmpc.pwa import PwaModel
-from qpmpc.qp import VARS, Linearisation, QpSettings, ScalingSettings, StageQp, Var
+from qpmpc.qp import Linearisation, QpSettings, ScalingSettings, StageQp, Var
 from qpmpc.vehicle import load_vehicle
 
 VEHICLE = load_vehicle()
@@ -78,10 +78,11 @@ def test_masked_stages_pass_the_state_on_at_no_cost():
     masked = np.flatnonzero(stages.duration_s == 0.0)
     assert len(masked) > 10
     for k in masked:
-        assert q[k * VARS + Var.FUEL] == 0.0
+        assert q[k * qp.structure.variables + Var.FUEL] == 0.0
         row = a[k * qp.rows.count + qp.rows.first("soc")]
         expected = np.zeros_like(row)
-        expected[k * VARS + Var.SOC], expected[(k - 1) * VARS + Var.SOC] = 1.0, -1.0
+        here = k * qp.structure.variables + Var.SOC
+        expected[here], expected[here - qp.structure.variables] = 1.0, -1.0
         np.testing.assert_allclose(row, expected, atol=1e-12)
 
 
@@ -93,7 +94,7 @@ def _lowest(qp, data):
     ]
     result = scipy.optimize.milp(q, constraints=rows, bounds=scipy.optimize.Bounds())
     assert result.success
-    return result.x.reshape(-1, VARS), result.fun
+    return result.x.reshape(qp.stages, -1), result.fun
 
 
 def test_one_stage_optimum_is_the_model_itself():
@@ -102,7 +103,7 @@ def test_one_stage_optimum_is_the_model_itself():
     net = VEHICLE.battery.power_discharge_max_w + 10e3
     trace = Trace(np.array([net - VEHICLE.battery.aux_power_w]), np.array([20.0]))
     off = trace.internal_off_w(VEHICLE)
-    stages = Stages(np.array([1.0]), np.array([net]), np.array([20.0]), off)
+    stages = Stages(np.array([1.0]), np.array([net]), np.array([20.0]), off, np.ones(1))
     qp = StageQp(VEHICLE, MODEL, 1, QpSettings(terminal_low=0.7), ScalingSettings())
     x, _ = _lowest(qp, qp.update(stages, 0.6, 60.0, _about(1, 60.0, 0.0)))
     sigma, p_eng = x[0, Var.ON], x[0, Var.P_ENG]
@@ -120,7 +121,7 @@ def test_constant_demand_without_thermal_coupling_is_charge_sustaining():
     net = 12e3
     n = 6
     off = Trace(np.full(n, net - VEHICLE.battery.aux_power_w), np.zeros(n)).internal_off_w(VEHICLE)
-    stages = Stages(np.full(n, 10.0), np.full(n, net), np.full(n, 20.0), off)
+    stages = Stages(np.full(n, 10.0), np.full(n, net), np.full(n, 20.0), off, np.zeros(n))
     vehicle = VEHICLE.with_settings({"cold_engine.k": 0.0, "trip.t_cl_init_degc": 70.0})
     model = PwaModel.of(vehicle)
     qp = StageQp(vehicle, model, n, QpSettings(), ScalingSettings())

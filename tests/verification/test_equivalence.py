@@ -86,11 +86,14 @@ def test_recorded_cases_are_the_qps_of_the_road() -> None:
         ({}, {"mh_qp.qp.soc_penalty_g": 500.0}),
         ({}, {"mh_qp.qp.soc_reserve": 0.0, "mh_qp.scaling.duration_exponent": 0.0}),
         ({"trip.soc_init": 0.45}, {"mh_qp.horizon.classes": 1, "mh_qp.qp.terminal_low": 0.99}),
+        ({"engine.start_fuel_g": 0.3}, {}),
+        ({"engine.start_energy_j": 4000.0}, {}),
+        ({"engine.start_fuel_g": 0.2, "engine.start_energy_j": 4000.0}, {}),
     ],
 )
 def test_other_settings(vehicle_changes: dict[str, object], changes: dict[str, object]) -> None:
     renderings, cases = made(VEHICLE.with_settings(vehicle_changes), changes)
-    for case in cases[:2]:
+    for case in cases[: 3 if renderings.qp.table.has_start else 2]:  # the engine on and off now
         assert_equal(renderings, case)
 
 
@@ -165,7 +168,7 @@ def test_twin_plans_as_the_product_does_without_regularisation() -> None:
     inputs = renderings.inputs(cases[0])
     renderings.twin.update(*inputs)
     x = renderings.twin.solve()
-    assert x.shape == (renderings.qp.stages, len(Var))
+    assert x.shape == (renderings.qp.stages, len(renderings.qp.table.variables))
     counts = inputs[0].duration_s > 0.0
     assert np.all(x[counts, Var.ON] < 1.0 + 1e-6)
     assert np.all(x[counts, Var.ON] > -1e-6)

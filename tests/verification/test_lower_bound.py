@@ -63,6 +63,45 @@ def test_no_controller_is_below_it(trip, bound, name):
     assert priced_g(simulate(trip, name, VEHICLE), bound) >= bound.fuel_g
 
 
+@pytest.fixture(scope="module", params=[(0.3, 0.0), (0.2, 4000.0)])
+def starting(request):
+    """Vehicle whose starts take fuel, or fuel and cranking."""
+    fuel_g, energy_j = request.param
+    return VEHICLE.with_settings({"engine.start_fuel_g": fuel_g, "engine.start_energy_j": energy_j})
+
+
+@pytest.fixture(scope="module")
+def starting_bound(trip, starting):
+    return lower_bound(trip, starting)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_no_random_drive_is_below_it_where_starts_cost_something(
+    trip, starting, starting_bound, seed
+):
+    road = Trip(trip, starting)
+    finished = simulate(road, Dice(road, seed))
+    assert not any(finished.summary()["violations"].values())
+    assert priced_g(finished, starting_bound) >= starting_bound.fuel_g
+
+
+def test_starts_raise_it_and_nothing_is_below_it(trip, bound, starting, starting_bound):
+    """By one start at the least: the engine cannot do without."""
+    best = simulate(trip, "mh-qp", starting)
+    starts = int(best.trajectory.started.sum())
+    assert starts > 0
+    assert bound.fuel_g + starting.engine.start_fuel_g < starting_bound.fuel_g
+    assert starting_bound.fuel_g <= priced_g(best, starting_bound)
+    assert starting_bound.fuel_g > 0.95 * priced_g(best, starting_bound)
+
+
+def test_the_optimum_is_above_it_where_starts_take_fuel(trip):
+    vehicle = VEHICLE.with_settings({"engine.start_fuel_g": 0.3})
+    bound = lower_bound(trip, vehicle)
+    optimum = simulate(trip, "dp", vehicle, settings={"dp.grid": "quick"})
+    assert bound.fuel_g <= priced_g(optimum, bound)
+
+
 def test_it_is_not_empty_words(trip, bound):
     # On a trip this short one switch of the engine costs more than on a whole cycle.
     assert bound.fuel_g > 0.95 * priced_g(simulate(trip, "mh-qp", VEHICLE), bound)

@@ -241,3 +241,19 @@ def test_missing_casadi_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(QpmpcError, match=r"pip install 'qpmpc-iptm\[verification\]'") as error:
         SmoothMaps(VEHICLE).alpha(50.0)
     assert "\n" not in str(error.value)
+
+
+def test_starts_are_what_the_on_share_rises_and_are_paid_for() -> None:
+    cycle = beginning("nycc", 150)
+    starting = VEHICLE.with_settings({"engine.start_fuel_g": 0.2, "engine.start_energy_j": 4000.0})
+    nlp, free = planner(cycle, starting), planner(cycle)
+    for engine_on in (False, True):
+        seen = nlp.trip.observation(20, PlantState(0.6, 52.0, engine_on))
+        plan = nlp.solve(seen)
+        assert plan.solved
+        sigma, starts = plan.x[:, NlpVar.ON], plan.x[:, NlpVar.START]
+        before = np.concatenate([[float(engine_on)], sigma[:-1]])
+        expected = np.maximum(plan.stages.rises * (sigma - before), 0.0)
+        assert starts == pytest.approx(expected, abs=2e-3)
+        # what starts take: their fuel, and energy that has to be made with more
+        assert plan.cost_g > free.solve(seen).cost_g + 0.2 * starts.sum()

@@ -116,7 +116,7 @@ MUTATIONS = [
     ),
     Mutation(
         "plant forgets auxiliary power (eq. 2)", Plant, "step",
-        "demand_w + battery.aux_power_w - p_eng", "demand_w - p_eng", PLANT,
+        "demand_w + battery.aux_power_w + cranking", "demand_w + cranking", PLANT,
     ),
     Mutation(
         "plant's UA in km/h", qpmpc.vehicle.heat, "ua_w_per_k",
@@ -156,7 +156,7 @@ MUTATIONS = [
         "    return fields", "    fields[0] *= 0.9\n    return fields", STAGES,
     ),
     Mutation(
-        "long horizon is a second late", StageBuilder, "_long_fields",
+        "long horizon is a second late", StageBuilder, "_long_start",
         "np.clip(step + n_short, self", "np.clip(step + n_short + 1, self", STAGES,
     ),
     Mutation(
@@ -166,7 +166,8 @@ MUTATIONS = [
     # QP
     Mutation(
         "state of two stages before", QpStructure, "__init__",
-        "(k - self.entry_before) * VARS", "(k - 2 * self.entry_before) * VARS", QP,
+        "(k - self.entry_before) * self.variables",
+        "(k - 2 * self.entry_before) * self.variables", QP,
     ),
     Mutation(
         "alpha' = 0", rows, "QUANTITIES",

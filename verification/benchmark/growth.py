@@ -35,7 +35,8 @@ def growth(vehicle: Vehicle) -> list[dict[str, Any]]:
     rows = []
     for count in STAGES:
         at = np.arange(count) % trace.steps
-        stages = Stages(np.ones(count), net[at], speed[at], off[at])
+        each = np.ones(count)
+        stages = Stages(each, net[at], speed[at], off[at], each)
         about = Linearisation.constant(count, 60.0)
         qp = StageQp(vehicle, model, count, settings.qp, settings.scaling)
         solver = Osqp(settings.admm)

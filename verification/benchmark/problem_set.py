@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
-from qpmpc.qp.rows import VARS, Var
+from qpmpc.qp.rows import Var
 from qpmpc.qp.stage_qp import QpData
 from qpmpc.qp.structure import QpStructure
 from qpmpc.trip import Trip
@@ -148,7 +148,7 @@ def _extreme(
 ) -> float:
     """Highest or lowest value of a variable over all feasible points, solver units."""
     cost = np.zeros(structure.shape[1])
-    cost[stage * VARS + var] = -1.0 if highest else 1.0
+    cost[stage * structure.variables + var] = -1.0 if highest else 1.0
     a = structure.matrix_of(data.a_data)
     lower, upper = data.lower.copy(), data.upper.copy()
     if var is Var.SOC:
@@ -164,4 +164,4 @@ def _extreme(
     )
     if found.status != 0:
         raise RuntimeError(f"extreme of {var.name} in stage {stage}: {found.message}")
-    return float(found.x[stage * VARS + var])
+    return float(found.x[stage * structure.variables + var])

@@ -3,19 +3,22 @@
 With W(SOC) = C_bat times the integral of U_oc, the energy in the battery, every run that keeps
 the limits and every price lam >= 0 of energy satisfy
 
-    fuel + lam (W_0 - W_n) >= L(lam) = min sum_k h [ alpha(T_k) f(p_k) + lam G(P_k) ]
+    fuel + lam (W_0 - W_n) >= L(lam) = min sum_k h [ alpha(T_k) f(p_k) + lam G(P_k) ] + starts
 
 over all engine commands, with the coolant's dynamics kept and those of SOC left to its price
 (Lagrangian relaxation). `lower_bound` maximises L over lam. Where SOC_n >= SOC_0 the left side is
 at most the fuel, so that L is a lower bound on it. No convexity is assumed, nothing linearised.
+A start burns its fuel, whose heat goes where that of other fuel goes, and its cranking adds to the
+terminal power P of that second. The ramp of the engine and its shortest runs and rests are left
+out: they only forbid.
 
-L(lam) is computed by dynamic programming over the coolant temperature alone; all its
-approximations err on the low side:
+L(lam) is computed by dynamic programming over the coolant temperature and, where starts cost
+something, whether the engine runs; all its approximations err on the low side:
 
 - G(P) is the least internal power over soc_min..soc_max, less U' h I^2 / (2 C_bat), because the
   plant takes U_oc at the start of its explicit step
-- the radiator is left out, and a full battery, start fuel and engine off at full demand cost
-  nothing; the cabin takes its least heat. A warmer coolant never costs more, so heat may be
+- the radiator is left out, and a full battery and engine off at full demand cost nothing; the
+  cabin takes its least heat. A warmer coolant never costs more, so heat may be
   thrown away, and heat beyond T_max is
 - T_min may be undercut by one grid cell, at the price of heat at the edge
 - between the grid points in T and p the value is interpolated, and the most that this can be too
@@ -68,7 +71,7 @@ class LowerBound:
 class _Tables(NamedTuple):
     """Data of the recursion; the first power means the engine off."""
 
-    internal_w: Floats  # (steps, powers), infinite where not allowed
+    internal_w: Floats  # (2, steps, powers), infinite where not allowed; the second of a start
     ua_w_per_k: Floats  # (steps,)
     fuel_g_per_s: Floats  # (powers,)
     power_w: Floats  # (powers,)
@@ -76,13 +79,15 @@ class _Tables(NamedTuple):
     t_degc: Floats  # (temperatures,)
     alpha_sag: float
     fuel_sag_g_per_s: Floats  # (powers,)
-    internal_sag_w: Floats  # (steps, powers)
+    internal_sag_w: Floats  # (2, steps, powers)
     kink_share: float
     heat_k_per_g: float  # (1 - x) LHV / C
     k_per_j: float  # 1 / C
     work_share: float  # 1 - x
     t_amb_degc: float
     cabin_w: float
+    start_fuel_g: float
+    states: int  # 2 where starts cost something: engine off, engine on
 
 
 def lower_bound(cycle: Cycle, vehicle: Vehicle) -> LowerBound:
@@ -110,7 +115,7 @@ def lower_bound(cycle: Cycle, vehicle: Vehicle) -> LowerBound:
     low, high = 1.0 / (LAST_EFFICIENCY * lhv), 1.0 / (FIRST_EFFICIENCY * lhv)
 
     def bound(price: float, strict: float = 1.0) -> float:
-        value = _sweep(tables, price, strict)
+        value = _sweep(tables, price, strict)[0]  # from an engine that is off
         # the value falls with T: the grid point above the start is a lower bound at it
         node = int(np.searchsorted(tables.t_degc, start - 1e-9))
         return float(value[min(node, len(value) - 1)])
@@ -164,16 +169,17 @@ def _tables(cycle: Cycle, vehicle: Vehicle) -> _Tables:
     least_w, most_w = -battery.power_charge_max_w, battery.power_discharge_max_w
     samples = np.arange(least_w, most_w + 2.0 * FINE_W, FINE_W)
     internal = _least_internal_w(vehicle, samples)
-    net = equations.net_w(cycle)
-    asked = net[:, None] - power
+    asked = equations.net_w(cycle)[:, None] - power
+    asked = np.stack([asked, asked + engine.start_energy_j])  # within the second of a start
     # With too little engine power the battery cannot drive: not allowed, except at the last
     # power before the least that suffices.
     allowed = asked <= most_w + POWER_STEP_W * (np.arange(len(power)) > 0)
+    allowed[1, :, 0] = False  # a start with the engine off
     terminal = np.clip(asked, least_w, most_w)
     internal_sag = np.interp(terminal, samples, _internal_sag_w(internal))
     # where the brakes take over, G stops falling: a kink that a chord may cut off
     internal_sag += np.where(np.abs(asked - least_w) <= POWER_STEP_W, 0.25 * POWER_STEP_W, 0.0)
-    internal_sag[:, 0] = np.max(np.abs(np.diff(internal, 2)))  # off: no chord between powers
+    internal_sag[:, :, 0] = np.max(np.abs(np.diff(internal, 2)))  # off: no chord between powers
     g = np.interp(terminal, samples, internal)
     ua = equations.ua_w_per_k(0.5 * (cycle.speed_mps[1:] + cycle.speed_mps[:-1]))
     k_per_j = 1.0 / th.heat_capacity_j_per_k
@@ -197,6 +203,8 @@ def _tables(cycle: Cycle, vehicle: Vehicle) -> _Tables:
         work_share=share,
         t_amb_degc=th.t_amb_degc,
         cabin_w=float(equations.cabin_w(temperature).min()),
+        start_fuel_g=engine.start_fuel_g,
+        states=2 if engine.start_fuel_g > 0.0 or engine.start_energy_j > 0.0 else 1,
     )
 
 
@@ -230,48 +238,69 @@ def _internal_sag_w(internal_w: Floats) -> Floats:
 
 @compiled
 def _sweep(tables: _Tables, price: float, strict: float) -> Floats:
-    """Value (temperatures,) at departure; `strict` 1 subtracts all interpolation errors, 0 none."""
-    internal, temperature, alpha = tables.internal_w, tables.t_degc, tables.alpha
-    steps, powers = internal.shape
-    points = len(temperature)
+    """Value (states, temperatures) at departure; `strict` 1 subtracts all interpolation errors.
+
+    With 0 it subtracts none. States: engine off, and with starts that cost something, engine on.
+    """
+    temperature, alpha = tables.t_degc, tables.alpha
+    _, steps, powers = tables.internal_w.shape
+    points, states = len(temperature), tables.states
     t_low, cell = temperature[0], temperature[1] - temperature[0]
-    value, following = np.zeros(points), np.zeros(points)
-    kink, worst = np.zeros(points), np.zeros(points)
+    value, following = np.zeros((states, points)), np.zeros((states, points))
+    worst = np.zeros((states, points))
     alpha_sag_g = tables.fuel_g_per_s[powers - 1] * tables.alpha_sag
     for k in range(steps - 1, -1, -1):
         slope = 0.0
-        for i in range(points - 1):
-            slope = max(slope, (following[i] - following[i + 1]) / cell)
-        for i in range(1, points - 1):
-            kink[i] = max(following[i + 1] - 2.0 * following[i] + following[i - 1], 0.0)
-        kink[points - 1] = following[points - 2] - following[points - 1]  # flat beyond T_max
-        for i in range(points):
-            worst[i] = 0.0
-            for j in range(max(i - 1, 0), min(i + 3, points)):
-                worst[i] = max(worst[i], kink[j])
+        for e in range(states):
+            slope = max(slope, _bends(following[e], cell, worst[e]))
         bend = alpha[0] * (1.0 + slope * tables.heat_k_per_g)
         fixed = strict * alpha_sag_g
-        for i in range(points):
-            lost_w = tables.ua_w_per_k[k] * (temperature[i] - tables.t_amb_degc) + tables.cabin_w
-            cool = temperature[i] - tables.k_per_j * lost_w
-            best = np.inf
-            for j in range(powers):
-                if internal[k, j] == np.inf:
-                    continue
-                fuel_g = alpha[i] * tables.fuel_g_per_s[j]
-                work_k = tables.k_per_j * tables.work_share * tables.power_w[j]
-                place = (cool + tables.heat_k_per_g * fuel_g - work_k - t_low) / cell
-                if place < -1.0:
-                    continue
-                place = min(place, points - 1.0)
-                node = min(max(int(np.floor(place)), 0), points - 2)
-                along = (place - node) * (following[node + 1] - following[node])
-                cost_g = fuel_g + price * internal[k, j] + following[node] + along
-                sag_g = price * tables.internal_sag_w[k, j] + bend * tables.fuel_sag_g_per_s[j]
-                best = min(best, cost_g - strict * (sag_g + tables.kink_share * worst[node]))
-            value[i] = best - fixed
-        for i in range(1, points):
-            value[i] = min(value[i], value[i - 1])
-        for i in range(points):
-            following[i] = value[i]
+        for e in range(states):
+            for i in range(points):
+                lost_w = tables.ua_w_per_k[k] * (temperature[i] - tables.t_amb_degc)
+                cool = temperature[i] - tables.k_per_j * (lost_w + tables.cabin_w)
+                best = np.inf
+                for j in range(powers):
+                    now = 1 if j > 0 and states == 2 else 0  # the state that follows
+                    start = 1 if now > e else 0
+                    internal = tables.internal_w[start, k, j]
+                    if internal == np.inf:
+                        continue
+                    fuel_g = alpha[i] * tables.fuel_g_per_s[j] + start * tables.start_fuel_g
+                    work_k = tables.k_per_j * tables.work_share * tables.power_w[j]
+                    place = (cool + tables.heat_k_per_g * fuel_g - work_k - t_low) / cell
+                    if place < -1.0:
+                        continue
+                    place = min(place, points - 1.0)
+                    node = min(max(int(np.floor(place)), 0), points - 2)
+                    low = following[now, node]
+                    along = (place - node) * (following[now, node + 1] - low)
+                    cost_g = fuel_g + price * internal + low + along
+                    sag_g = price * tables.internal_sag_w[start, k, j]
+                    sag_g += bend * tables.fuel_sag_g_per_s[j]
+                    kink_g = tables.kink_share * worst[now, node]
+                    best = min(best, cost_g - strict * (sag_g + kink_g))
+                value[e, i] = best - fixed
+            for i in range(1, points):
+                value[e, i] = min(value[e, i], value[e, i - 1])
+        for e in range(states):
+            for i in range(points):
+                following[e, i] = value[e, i]
     return value
+
+
+@compiled
+def _bends(following: Floats, cell: float, worst: Floats) -> float:
+    """Steepest fall of the value; `worst`: its largest convex kink near each cell."""
+    points, slope = len(following), 0.0
+    kink = np.zeros(points)
+    for i in range(points - 1):
+        slope = max(slope, (following[i] - following[i + 1]) / cell)
+    for i in range(1, points - 1):
+        kink[i] = max(following[i + 1] - 2.0 * following[i] + following[i - 1], 0.0)
+    kink[points - 1] = following[points - 2] - following[points - 1]  # flat beyond T_max
+    for i in range(points):
+        worst[i] = 0.0
+        for j in range(max(i - 1, 0), min(i + 3, points)):
+            worst[i] = max(worst[i], kink[j])
+    return slope

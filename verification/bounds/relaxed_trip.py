@@ -15,7 +15,6 @@ from qpmpc.preview import HorizonSettings, StageBuilder, Trace
 from qpmpc.pwa import PwaModel
 from qpmpc.pwa.model import PwaTolerances
 from qpmpc.qp import Linearisation, QpSettings, ScalingSettings, StageQp, Var
-from qpmpc.qp.rows import VARS
 from qpmpc.solvers.names import make_solver
 from qpmpc.vehicle.parameters import Vehicle
 
@@ -35,7 +34,7 @@ class RelaxedTrip:
 
     Attributes
     ----------
-    fuel_g : sum h alpha(T) F
+    fuel_g : sum h alpha(T) F, and the fuel of starts
     integral_share : share of seconds whose on-share is within 0.02 of 0 or 1
     rounds : linearisations until the fuel converged
     """
@@ -76,10 +75,12 @@ def relaxed_trip(cycle: Cycle, vehicle: Vehicle) -> RelaxedTrip:
         solution = solver.solve(data, None, None, cold=True)
         if not solution.usable:
             raise QpmpcError(f"relaxed trip {cycle.name}: {solution.status.value}")
-        x = data.scaling.primal(solution.primal).reshape(-1, VARS)
+        x = data.scaling.primal(solution.primal).reshape(preview.count, -1)
         ends = x[:, Var.T_CL]
         mean = 0.5 * (ends + np.concatenate([[start], ends[:-1]]))
         last, fuel_g = fuel_g, float(np.sum(stages.duration_s * under.alpha(mean) * x[:, Var.FUEL]))
+        if qp.table.start_fuel:
+            fuel_g += vehicle.engine.start_fuel_g * float(x[:, Var.START].sum())
         if abs(fuel_g - last) < CONVERGED_G:
             on = x[:, Var.ON]
             integral = float(np.mean((on < INTEGRAL) | (on > 1.0 - INTEGRAL)))

@@ -57,10 +57,11 @@ class Context:
     Parameters
     ----------
     quick : fewer cycles and samples
+    vehicle : that drives; the default one if None
     """
 
-    def __init__(self, quick: bool) -> None:
-        self.quick = quick
+    def __init__(self, quick: bool, vehicle: Vehicle | None = None) -> None:
+        self.quick, self._vehicle = quick, vehicle
         self.settings = ControllerSettings()
         self._loops: dict[str, Loop] = {}
 
@@ -71,8 +72,8 @@ class Context:
 
     @cached_property
     def vehicle(self) -> Vehicle:
-        """The default vehicle."""
-        return load_vehicle()
+        """The vehicle that drives."""
+        return self._vehicle or load_vehicle()
 
     @cached_property
     def vehicles(self) -> tuple[Vehicle, ...]:
@@ -80,7 +81,7 @@ class Context:
         return tuple(load_vehicle(name) for name in vehicle_names())
 
     def trip(self, cycle: str) -> Trip:
-        """A shipped cycle, driven by the default vehicle."""
+        """A shipped cycle, driven by the vehicle."""
         return Trip(cycle, self.vehicle)
 
     def loop(self, cycle: str) -> Loop:

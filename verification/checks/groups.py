@@ -16,6 +16,7 @@ from qpmpc.verification.checks import (
     relaxed_trip_checks,
     rendering_checks,
     safety_checks,
+    start_checks,
 )
 from qpmpc.verification.checks.check import Check
 from qpmpc.verification.checks.context import Context
@@ -79,6 +80,7 @@ BOUNDS = Group(
     "Least fuel of a trip",
     (bound_checks.bound_below_everything, relaxed_trip_checks.relaxed_trip_close),
 )
+STARTS = Group("Starts that cost something", (start_checks.with_starts,), quick=False)
 
 
 def run_checks(group: Group, context: Context) -> Iterator[Check]:

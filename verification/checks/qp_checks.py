@@ -14,7 +14,6 @@ from qpmpc.solvers.names import make_solver
 from qpmpc.verification.checks.check import Check
 from qpmpc.verification.checks.context import Context, Loop
 from qpmpc.verification.independent.stage_program import (
-    COUNT,
     FUEL,
     Curves,
     StageProgram,
@@ -47,12 +46,13 @@ def stages_agree(context: Context) -> Iterator[Check]:
                 (ours.net_w, theirs.net_w),
                 (ours.speed_mps, theirs.speed_mps),
                 (ours.internal_off_w, theirs.off_w),
+                (ours.rises, theirs.rises),
             )
             for a, b in pairs:
                 worst = max(worst, float(np.max(np.abs(a - b)) / max(np.abs(b).max(), 1.0)))
         yield Check(
             f"Stages of the horizon, {loop.name}",
-            "Durations, P0, speeds and l(P0) are the means over the seconds that they represent.",
+            "Durations, P0, speeds, l(P0) and rises are those of the seconds that they represent.",
             1e-9,
             worst,
             "relative",
@@ -61,7 +61,8 @@ def stages_agree(context: Context) -> Iterator[Check]:
 
 def _program(loop: Loop, curves: Curves, step: int) -> StageProgram:
     tr, vehicle = loop.run.trajectory, loop.run.vehicle
-    state = (float(tr.soc[step]), float(tr.t_cl_degc[step]))
+    running = step > 0 and bool(tr.engine_on[step - 1])
+    state = (float(tr.soc[step]), float(tr.t_cl_degc[step]), running)
     about = expansion(loop.x(step - 1), loop.settings, state[1])
     road = horizon(loop.trip.cycle, vehicle, loop.settings, step)
     return stage_program(vehicle, curves, loop.settings, road, state, about)
@@ -130,7 +131,7 @@ def exact(structure: QpStructure, data: QpData) -> QpSolution:
 
 def _relative(ours: float, least: float, program: StageProgram, x: Floats) -> float:
     """Difference of costs in units of the fuel planned, at least 10 g."""
-    size = max(float(np.abs(program.cost * x).reshape(-1, COUNT)[:, FUEL].sum()), 10.0)
+    size = max(float(np.abs(program.cost * x).reshape(program.stages, -1)[:, FUEL].sum()), 10.0)
     difference = abs(ours - least) / size
     return difference if np.isfinite(difference) else float("inf")
 

@@ -19,26 +19,30 @@ from qpmpc.verification.independent.equations import Equations
 
 Floats = NDArray[np.float64]
 
-# variables of a stage, in the product's order
-SOC, T_CL, P_ENG, ON, FUEL, INTERNAL, T_SLACK = range(7)
-COUNT = 7
+# variables of a stage, in the product's order; the last where a start costs something
+SOC, T_CL, P_ENG, ON, FUEL, INTERNAL, T_SLACK, START = range(8)
 
 
 @dataclass(frozen=True)
 class Horizon:
-    """Duration (s), P0 (W), mean speed (m/s) and mean l(P0) (W) of each stage; shape (n,)."""
+    """Duration (s), P0 (W), mean speed (m/s) and mean l(P0) (W) of each stage; shape (n,).
+
+    `rises`: starts in the stage for an on-share that is one more than that of the stage before.
+    """
 
     h: Floats
     net_w: Floats
     speed_mps: Floats
     off_w: Floats
+    rises: Floats
 
 
 def horizon(cycle: Cycle, vehicle: Vehicle, settings: MhQpSettings, step: int) -> Horizon:
     """Stages at one time step, from the cycle, for an exact forecast.
 
     The next N seconds one by one; then the rest of each block after those, split into hard, easy
-    and braking seconds.
+    and braking seconds. On from the hard to the easy seconds of a block the engine stops, and
+    starts again, as often as the demand rises into the hard ones; likewise from easy to braking.
     """
     grid, equations = settings.horizon, Equations(vehicle)
     demand, net = equations.demand_w(cycle), equations.net_w(cycle)
@@ -49,16 +53,18 @@ def horizon(cycle: Cycle, vehicle: Vehicle, settings: MhQpSettings, step: int) -
     n, length = grid.short_stages, -(-steps // grid.blocks)
     rows: list[list[float]] = []
     for t in range(step, step + n):
-        rows.append([1.0, net[t], speed[t], off[t]] if t < steps else [0.0] * 4)
+        rows.append([1.0, net[t], speed[t], off[t], 1.0] if t < steps else [0.0] * 5)
     for block in range(grid.blocks):
         seconds = range(max(block * length, step + n), min((block + 1) * length, steps))
         classes: list[list[int]] = [[], [], []]
         for t in seconds:
             hard, braking = demand[t] > grid.class_hard_w, demand[t] < grid.class_braking_w
             classes[0 if hard else 2 if braking else 1].append(t)
-        for member in classes:
+        into_hard = [t for t in seconds if demand[t - 1] <= grid.class_hard_w < demand[t]]
+        off_braking = [t for t in seconds if demand[t - 1] < grid.class_braking_w <= demand[t]]
+        for member, entries in zip(classes, ([], into_hard, off_braking), strict=True):
             means = [float(np.mean(a[member])) for a in (net, speed, off)] if member else [0.0] * 3
-            rows.append([float(len(member)), *means])
+            rows.append([float(len(member)), *means, -grid.rise_share * len(entries)])
     return Horizon(*np.array(rows).T)
 
 
@@ -81,7 +87,7 @@ def expansion(previous: Floats, settings: MhQpSettings, t_cl_degc: float) -> Exp
 
     Parameters
     ----------
-    previous : solution of the step before, SI units, shape (stages, 7)
+    previous : solution of the step before, SI units, shape (stages, variables)
     t_cl_degc : measured
     """
     moved = shifted(previous, settings)
@@ -109,6 +115,7 @@ class StageProgram:
     `names` names each inequality.
     """
 
+    stages: int
     cost: Floats
     equal: Floats
     equal_to: Floats
@@ -220,15 +227,20 @@ def stage_program(
     curves: Curves,
     settings: MhQpSettings,
     road: Horizon,
-    state: tuple[float, float],
+    state: tuple[float, float, bool],
     about: Expansion,
 ) -> StageProgram:
-    """Write the problem down for one horizon, one state (SOC, degC) and one expansion."""
+    """Write the problem down for one horizon, one state and one expansion.
+
+    `state`: SOC, degC, whether the engine runs.
+    """
     equations, battery, th = Equations(vehicle), vehicle.battery, vehicle.thermal
     engine, qp = vehicle.engine, settings.qp
     n = len(road.h)
-    rows, same = _Rows(n * COUNT), _Rows(n * COUNT)
-    cost = np.zeros(n * COUNT)
+    starts_cost = engine.start_fuel_g > 0.0 or engine.start_energy_j > 0.0
+    count = START + starts_cost
+    rows, same = _Rows(n * count), _Rows(n * count)
+    cost = np.zeros(n * count)
     energy = float(equations.voltage_v(vehicle.trip.soc_init)) * 3600.0 * battery.capacity_ah
     lhv, share = equations.lhv_j_per_g, 1.0 - th.exhaust_share
     reach = state[0]
@@ -238,12 +250,18 @@ def stage_program(
         float(np.max(curves.fuel.slope * p + curves.fuel.intercept))
         for p in (0.0, engine.power_max_w)
     ]
+    idle_w = battery.aux_power_w
+    drawn_w = [
+        float(np.max(curves.battery.slope * p + curves.battery.intercept))
+        for p in (idle_w, idle_w + engine.start_energy_j)
+    ]
+    crank_j = drawn_w[1] - drawn_w[0]  # within a second
     per_w = (on_curve[1] - on_curve[0]) / engine.power_max_w
     for k in range(n):
         h, net, off = float(road.h[k]), float(road.net_w[k]), float(road.off_w[k])
         t0, f0, e0, begin, end = (float(part[k]) for part in about)
-        at = {name: k * COUNT + name for name in range(COUNT)}
-        before = {name: at[name] - COUNT for name in (SOC, T_CL)}
+        at = {name: k * count + name for name in range(count)}
+        before = {name: at[name] - count for name in (SOC, T_CL, ON)}
         # alpha and its slope: the piece that is highest at T^
         piece = int(np.argmax(curves.alpha.slope * t0 + curves.alpha.intercept))
         alpha = float(curves.alpha.slope[piece] * t0 + curves.alpha.intercept[piece])
@@ -253,8 +271,12 @@ def stage_program(
         if k:
             cost[before[T_CL]] += 0.5 * h * growth
         cost[at[T_SLACK]] += qp.slack_g_per_k
+        if starts_cost:
+            cost[at[START]] = engine.start_fuel_g
 
         terms = {at[SOC]: 1.0, at[INTERNAL]: h / energy}
+        if starts_cost:
+            terms[at[START]] = crank_j / energy
         if k:
             terms[before[SOC]] = -1.0
         same.add("SOC", state[0] if k == 0 else 0.0, terms)
@@ -277,6 +299,8 @@ def stage_program(
             at[FUEL]: -per_heat * share * lhv * alpha,
             at[P_ENG]: per_heat * share,
         }
+        if starts_cost:  # heat of all starts, spread over the stage
+            terms[at[START]] = -per_heat * share * lhv * engine.start_fuel_g / max(h, 1.0)
         balance = after(heat, begin) + per_heat * (gain - heat) - per_begin * begin
         if k:
             terms[before[T_CL]] = loss - per_begin
@@ -313,10 +337,18 @@ def stage_program(
             low = max(qp.terminal_low * vehicle.trip.soc_init, battery.soc_min)
             high = min(qp.terminal_high * vehicle.trip.soc_init, high)
         rows.add("SOC max", high, {at[SOC]: 1.0})
-        rows.add("SOC min", -min(low, reach - 1e-5), {at[SOC]: -1.0})
+        rows.add("SOC min", -min(low, reach - 1e-5 - crank_j / energy), {at[SOC]: -1.0})
         rows.add("coolant min", -float(floor[k]), {at[T_CL]: -1.0, at[T_SLACK]: -1.0})
         rows.add("coolant max", th.t_cl_max_degc - 0.05, {at[T_CL]: 1.0, at[T_SLACK]: -1.0})
         rows.add("slack", 0.0, {at[T_SLACK]: -1.0})
+        if starts_cost:
+            rise = float(road.rises[k])
+            terms = {at[START]: -1.0, at[ON]: rise}
+            if k:
+                terms[before[ON]] = -rise
+            rows.add("starts", rise * state[2] if k == 0 else 0.0, terms)
+            rows.add("no negative starts", 0.0, {at[START]: -1.0})
     return StageProgram(
+        n,
         cost, np.array(same.a), np.array(same.b), np.array(rows.a), np.array(rows.b), rows.names
     )

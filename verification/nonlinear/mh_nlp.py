@@ -69,9 +69,10 @@ class MhNlp(Planner):
         if start is not None:
             for _ in range(seen.step - self._last_step):
                 start = start.shifted(self._shift)
-        plan = self.solver.solve(stages, seen.soc, seen.t_cl_degc, start)
+        state = seen.soc, seen.t_cl_degc
+        plan = self.solver.solve(stages, *state, start, seen.engine_on)
         if not plan.solved and start is not None:
-            again = self.solver.solve(stages, seen.soc, seen.t_cl_degc)
+            again = self.solver.solve(stages, *state, None, seen.engine_on)
             plan = replace(again, iterations=again.iterations + plan.iterations)
         if self.solver_fails:
             plan = replace(plan, solved=False)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from qpmpc.preview.stages import Stages
 from qpmpc.qp.coolant_floor import CoolantFloor
 from qpmpc.qp.heat_reserve import heat_reserve_k
-from qpmpc.qp.rows import ACCURATE_STAGE_S, SIGMA_FORCED, Var
+from qpmpc.qp.rows import ACCURATE_STAGE_S, SHORTEST_SCALE_S, SIGMA_FORCED, Var, table_of
 from qpmpc.qp.stage_qp import T_CL_MAX_MARGIN_K, QpSettings
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.heat import air_w
@@ -31,10 +31,10 @@ class NlpVar(IntEnum):
     ABOVE = Var.P_ENG  # D, mean engine power above the least running power, W
     ON = Var.ON
     T_SLACK = Var.ON + 1
+    START = Var.ON + 2  # only where a start costs something
 
 
-NLP_VARS = len(NlpVar)
-UNIT = np.array([0.01, 1.0, 10e3, 1.0, 1.0])
+UNIT = np.array([0.01, 1.0, 10e3, 1.0, 1.0, 1.0])
 
 SOC_ROW = 2  # of the rows of a stage, the limit that may have to give way
 T_CL_ROW = 3  # the lower limit of the coolant, which the trip ahead may raise
@@ -63,13 +63,14 @@ class NlpData:
 class NlpProblem:
     """The nonlinear program of one trip: built once, parameters and bounds updated each step.
 
-    min  sum_k h_k alpha(T_k) sigma_k f(P_k) + prices of limits exceeded, subject to
+    min  sum_k h_k alpha(T_k) sigma_k f(P_k) + starts + prices of limits exceeded, subject to
 
     - SOC_k <= SOC_{k-1} - h_k/C_bat [sigma_k I(SOC, P0_k - P_k) + (1 - sigma_k) I_off,k(SOC)]
       (paper eq. 1; smaller where the friction brakes take what a full battery cannot), with
       U I_off = l_k + G(SOC, P0_k) - G(SOC_init, P0_k) and l_k the stage's mean off-power
     - C dT/dt = (1 - x)(LHV alpha(T) F_k - E_k) - UA(v_k)(T - T_amb) - Q_heat(T) - Q_rad (eq. 3)
       with F = sigma f(P), E = sigma P; Q_rad follows T within the stage
+    - u_k >= r_k (sigma_k - sigma_{k-1}), u_k >= 0: starts, whose fuel, heat and cranking count
     - the limits of eqs. (9)-(11), T and SOC without index being the mean over the stage
 
     The variables are sigma and D with P = P_least + D / sigma: in this perspective form the program
@@ -84,6 +85,10 @@ class NlpProblem:
     stages : number of stages
     short_stages : how many of them, at the front, are of one second
     settings : terminal band and margins, the same as the QP's
+
+    Attributes
+    ----------
+    count : variables of a stage
     """
 
     def __init__(
@@ -91,16 +96,18 @@ class NlpProblem:
     ) -> None:
         self.vehicle, self.stages, self.settings = vehicle, stages, settings
         self._maps = SmoothMaps(vehicle)
+        self._has_start = table_of(vehicle.engine).has_start
+        self.count = len(NlpVar) if self._has_start else len(NlpVar) - 1
         self._build(short_stages)
 
     def _build(self, short_stages: int) -> None:
         ca, n, trip = casadi(), self.stages, self.vehicle.trip
-        z = ca.MX.sym("z", NLP_VARS, n)
+        z = ca.MX.sym("z", self.count, n)
         missing = ca.MX.sym("missing")  # of SOC, in solver units
-        road = ca.MX.sym("road", 6, n)  # h, P0, v, l, least and most engine power
-        state = ca.MX.sym("state", 2)
-        x = z * ca.repmat(ca.DM(UNIT), 1, n)
-        before = ca.horzcat(state, x[: NlpVar.T_CL + 1, :-1])
+        road = ca.MX.sym("road", 7, n)  # h, P0, v, l, least and most engine power, rises
+        state = ca.MX.sym("state", 3)  # SOC, T, whether the engine runs
+        x = z * ca.repmat(ca.DM(UNIT[: self.count]), 1, n)
+        before = ca.horzcat(state[:2], x[: NlpVar.T_CL + 1, :-1])
         parts = []
         for inside, steps in ((slice(short_stages), 1), (slice(short_stages, n), THERMOSTAT_STEPS)):
             if count := len(range(n)[inside]):
@@ -113,6 +120,11 @@ class NlpProblem:
         cost += WASTE_G * ca.sum2(soc_gain) / UNIT[NlpVar.SOC]
         weight = ca.if_else(road[0, :] > 0.0, REGULARISATION, MASKED_REGULARISATION)
         cost += ca.sum2(weight * ca.sum1(z[NlpVar.ABOVE :, :] ** 2))
+        rows_of_start = []
+        if self._has_start:
+            cost += self.vehicle.engine.start_fuel_g * ca.sum2(x[NlpVar.START, :])
+            rise = sigma - ca.horzcat(state[2], sigma[:-1])
+            rows_of_start = [x[NlpVar.START, :] - road[6, :] * rise]
         if self.settings.soc_penalty_g:
             cost += self.settings.soc_penalty_g * (x[NlpVar.SOC, -1] - trip.soc_init) ** 2
         rows = ca.vertcat(
@@ -122,6 +134,7 @@ class NlpProblem:
             x[NlpVar.T_CL, :] + x[NlpVar.T_SLACK, :],
             x[NlpVar.T_CL, :] - x[NlpVar.T_SLACK, :],
             ((road[5, :] - road[4, :]) * sigma - x[NlpVar.ABOVE, :]) / UNIT[NlpVar.ABOVE],
+            *rows_of_start,
         )
         self.rows_per_stage = rows.shape[0]
         self.program: dict[str, Any] = {
@@ -140,7 +153,7 @@ class NlpProblem:
         """One stage: (SOC and T before, variables, road) -> fuel g, SOC surplus, coolant gap."""
         ca, maps, vehicle = casadi(), self._maps, self.vehicle
         th = vehicle.thermal
-        before, x, road = ca.SX.sym("before", 2), ca.SX.sym("x", NLP_VARS), ca.SX.sym("road", 6)
+        before, x, road = ca.SX.sym("before", 2), ca.SX.sym("x", self.count), ca.SX.sym("road", 7)
         h, net_w, speed_mps = road[0], road[1], road[2]
         sigma = x[NlpVar.ON]
         power = road[4] + x[NlpVar.ABOVE] / sigma
@@ -156,7 +169,18 @@ class NlpProblem:
         heat = (1.0 - th.exhaust_share) * (lhv_j_per_g * fuel - sigma * power)
         heat -= air_w(th, t_cl, speed_mps)
         heat -= maps.cabin_w(t_cl)
-        soc_gain = before[0] - h * current / (3600.0 * vehicle.battery.capacity_ah) - x[NlpVar.SOC]
+        if self._has_start:
+            engine, start = vehicle.engine, x[NlpVar.START]
+            aux_w = vehicle.battery.aux_power_w
+            cranking_w = maps.internal_w(soc, aux_w + engine.start_energy_j)  # for a second
+            cranking_w -= maps.internal_w(soc, aux_w)
+            cranking = start * cranking_w / maps.voltage_v(soc)
+            start_w = lhv_j_per_g * engine.start_fuel_g * start / ca.fmax(h, SHORTEST_SCALE_S)
+            heat += (1.0 - th.exhaust_share) * start_w
+        else:
+            cranking = 0.0
+        charge_c = 3600.0 * vehicle.battery.capacity_ah
+        soc_gain = before[0] - (h * current + cranking) / charge_c - x[NlpVar.SOC]
         t_cl_gap = self._coolant_after(before[1], h, heat, thermostat_steps) - x[NlpVar.T_CL]
         return ca.Function("stage", [before, x, road], [h * fuel, soc_gain, t_cl_gap])
 
@@ -180,22 +204,25 @@ class NlpProblem:
     def _row_bounds(self) -> tuple[Floats, Floats]:
         """Bounds of the rows, except the lower limits of SOC and coolant, which change."""
         thermal = self.vehicle.thermal
-        lower, upper = np.full((self.stages, 6), -np.inf), np.full((self.stages, 6), np.inf)
-        lower[:, [0, 1, 5]], upper[:, 1] = 0.0, 0.0
+        shape = self.stages, self.rows_per_stage
+        lower, upper = np.full(shape, -np.inf), np.full(shape, np.inf)
+        lower[:, [0, 1, *range(5, self.rows_per_stage)]], upper[:, 1] = 0.0, 0.0
         upper[:, 4] = thermal.t_cl_max_degc - T_CL_MAX_MARGIN_K
         return lower, upper
 
-    def data(self, stages: Stages, soc: float, t_cl_degc: float) -> NlpData:
+    def data(
+        self, stages: Stages, soc: float, t_cl_degc: float, engine_on: bool = False
+    ) -> NlpData:
         """Parameters and bounds for a horizon and a state.
 
         Parameters
         ----------
         stages : the trip ahead
-        soc, t_cl_degc : state at its start
+        soc, t_cl_degc, engine_on : state at its start
         """
         battery, engine = self.vehicle.battery, self.vehicle.engine
         net = stages.net_w
-        lower, upper = np.zeros((self.stages, NLP_VARS)), np.zeros((self.stages, NLP_VARS))
+        lower, upper = np.zeros((self.stages, self.count)), np.zeros((self.stages, self.count))
         most = np.minimum(engine.power_max_w, net + battery.power_charge_max_w)
         least = np.maximum(engine.power_min_w, net - battery.power_discharge_max_w)
         must, can = net > battery.power_discharge_max_w, most > engine.power_min_w
@@ -209,16 +236,15 @@ class NlpProblem:
         upper[:, NlpVar.ABOVE] = np.inf
         lower[:, NlpVar.ON] = np.where(must, SIGMA_FORCED, SIGMA_LEAST)
         upper[:, NlpVar.ON] = np.where(can, 1.0, 2.0 * SIGMA_LEAST)
-        upper[:, NlpVar.T_SLACK] = np.inf
-        road = np.stack(
-            [stages.duration_s, net, stages.speed_mps, stages.internal_off_w, least, most]
-        )
+        upper[:, NlpVar.T_SLACK :] = np.inf
+        fields = stages.duration_s, net, stages.speed_mps, stages.internal_off_w
+        road = np.stack([*fields, least, most, stages.rises])
         row_lower = self._row_lower.copy()
         row_lower[:, SOC_ROW] = self._soc_low(stages, soc) / UNIT[NlpVar.SOC]
         row_lower[:, T_CL_ROW] = self._floor.at(stages, soc)
         return NlpData(
             power_least_w=least,
-            parameters=np.concatenate([road.ravel(order="F"), [soc, t_cl_degc]]),
+            parameters=np.concatenate([road.ravel(order="F"), [soc, t_cl_degc, float(engine_on)]]),
             lower=np.append(lower.ravel(), 0.0),
             upper=np.append(upper.ravel(), np.inf),
             row_lower=row_lower.ravel(),

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from qpmpc.preview.stages import Stages
 from qpmpc.verification.nonlinear.maps import casadi
-from qpmpc.verification.nonlinear.problem import NLP_VARS, UNIT, NlpData, NlpProblem, NlpVar
+from qpmpc.verification.nonlinear.problem import UNIT, NlpData, NlpProblem, NlpVar
 
 Floats = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ class NlpPlan:
     ----------
     stages : the horizon
     power_least_w : least power of a running engine, shape (n,)
-    z : variables in solver units, shape (n, NLP_VARS)
+    z : variables in solver units, shape (n, variables)
     missing, bound_duals, row_duals : further data of a warm start
     cost_g : objective
     solved : whether IPOPT reached its tolerance
@@ -62,8 +62,8 @@ class NlpPlan:
 
     @property
     def x(self) -> Floats:
-        """Variables in SI units, shape (n, NLP_VARS), columns as in `NlpVar`."""
-        return np.asarray(self.z * UNIT)
+        """Variables in SI units, shape (n, variables), columns as in `NlpVar`."""
+        return np.asarray(self.z * UNIT[: self.z.shape[1]])
 
     def power_on_w(self, stage: int) -> float:
         """Engine power of a stage while the engine is on."""
@@ -72,7 +72,7 @@ class NlpPlan:
 
     def shifted(self, source: NDArray[np.intp]) -> "NlpPlan":
         """Return the start for the next step: slot i takes the values of slot `source[i]`."""
-        bounds = self.bound_duals[:-1].reshape(-1, NLP_VARS)[source].ravel()
+        bounds = self.bound_duals[:-1].reshape(len(source), -1)[source].ravel()
         rows = self.row_duals.reshape(len(source), -1)[source].ravel()
         return NlpPlan(
             self.stages,
@@ -107,16 +107,17 @@ class NlpSolver:
         soc: float,
         t_cl_degc: float,
         start: NlpPlan | None = None,
+        engine_on: bool = False,
     ) -> NlpPlan:
         """Solve for a horizon and a state, from `start`, or from cold.
 
         Parameters
         ----------
         stages : the trip ahead
-        soc, t_cl_degc : state at its start
+        soc, t_cl_degc, engine_on : state at its start
         start : plan to start from
         """
-        data = self.problem.data(stages, soc, t_cl_degc)
+        data = self.problem.data(stages, soc, t_cl_degc, engine_on)
         if start is None:
             x0 = np.clip(self._departure(soc, t_cl_degc), data.lower, data.upper)
             return self._plan(stages, self._cold, data, x0=x0)
@@ -130,7 +131,7 @@ class NlpSolver:
         )
 
     def _departure(self, soc: float, t_cl_degc: float) -> Floats:
-        z = np.zeros((self.problem.stages, NLP_VARS))
+        z = np.zeros((self.problem.stages, self.problem.count))
         z[:, NlpVar.SOC] = soc / UNIT[NlpVar.SOC]
         z[:, NlpVar.T_CL] = t_cl_degc
         z[:, NlpVar.ABOVE] = DEPARTURE_SIGMA * DEPARTURE_POWER_W / UNIT[NlpVar.ABOVE]
@@ -151,7 +152,7 @@ class NlpSolver:
         return NlpPlan(
             stages,
             data.power_least_w,
-            x[:-1].reshape(-1, NLP_VARS),
+            x[:-1].reshape(self.problem.stages, -1),
             float(x[-1]),
             _array(result["lam_x"]),
             _array(result["lam_g"]),

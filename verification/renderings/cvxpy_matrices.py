@@ -8,7 +8,6 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
 from qpmpc.qp.cvxpy_twin import UNIT, CvxpyTwin
-from qpmpc.qp.rows import VARS, Var
 from qpmpc.verification.renderings.matrices import Matrices
 
 Floats = NDArray[np.float64]
@@ -22,9 +21,9 @@ def cvxpy_matrices(twin: CvxpyTwin) -> Matrices:
     """
     data, _, _ = twin.problem.get_problem_data("CLARABEL")
     columns = data["param_prob"].var_id_to_col
-    ours = np.empty((twin.stages, VARS), dtype=np.intp)
-    unit = np.empty((twin.stages, VARS))
-    for var in Var:
+    shape = twin.stages, len(twin.variables)
+    ours, unit = np.empty(shape, dtype=np.intp), np.empty(shape)
+    for var in twin.variables:
         ours[:, var] = columns[twin.variables[var].id] + np.arange(twin.stages)
         unit[:, var] = UNIT[var]
     return _reduced(data, ours.ravel(), unit.ravel())

@@ -114,11 +114,12 @@ class Renderings:
         self._solver = Piqp(EXACT)
         self._is_set_up = False
 
-    def inputs(self, case: QpCase) -> tuple[Stages, float, float, Linearisation]:
+    def inputs(self, case: QpCase) -> tuple[Stages, float, float, Linearisation, bool]:
         """Return the data for updating the renderings in Python."""
         seen = case.seen
         about = Linearisation.about(case.x, seen.t_cl_degc, self.preview.settings)
-        return self.preview.source.at(seen.step), seen.soc, seen.t_cl_degc, about
+        stages = self.preview.source.at(seen.step)
+        return stages, seen.soc, seen.t_cl_degc, about, seen.engine_on
 
     def compare(self, case: QpCase) -> dict[str, Difference]:
         """Build and solve one case in all renderings."""

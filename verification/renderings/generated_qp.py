@@ -10,7 +10,7 @@ from qpmpc.codegen.controller import InputBuilder
 from qpmpc.codegen.generate import project_files
 from qpmpc.codegen.host_library import HostLibrary, compiled
 from qpmpc.codegen.values import Values
-from qpmpc.qp.rows import VARS, Var
+from qpmpc.qp.rows import Var
 from qpmpc.trip import Observation
 from qpmpc.verification.renderings.matrices import Matrices, matrices_from
 
@@ -50,8 +50,8 @@ class GeneratedQp:
         self.inputs = inputs
         self._state = ctypes.create_string_buffer(self.library.state_bytes)
         self._in = self.library.input_type()
-        self._columns = values.sizes.stages, VARS
-        self._rows = values.sizes.stages, values.sizes.rows
+        self._columns = values.sizes.stages, values.variables
+        self._rows = values.sizes.stages, values.rows.count
 
     def update(self, seen: Observation, x: Floats) -> Matrices:
         """Make the QP of an observation, expanded about a plan.
@@ -59,7 +59,7 @@ class GeneratedQp:
         Parameters
         ----------
         seen : step and state
-        x : plan in SI units, shape (stages, VARS)
+        x : plan in SI units, shape (stages, variables)
 
         Returns
         -------
@@ -68,9 +68,9 @@ class GeneratedQp:
         self.inputs.fill(seen, self._in)
         plan = np.array(x, dtype=float)
         cost = self._reader.reader_prepare(self._state, ctypes.byref(self._in), _pointer(plan))
-        stages, rows = self._rows
-        here, before = self._read("reader_matrix", (stages, rows, VARS), (stages, rows, VARS))
-        a = np.zeros((stages, rows, stages, VARS))
+        (stages, rows), variables = self._rows, self._columns[1]
+        here, before = self._read("reader_matrix", *[(stages, rows, variables)] * 2)
+        a = np.zeros((stages, rows, stages, variables))
         for k in range(stages):
             a[k, :, k] = here[k]
             if k:
@@ -100,7 +100,7 @@ class GeneratedQp:
 
         Returns
         -------
-        x in SI units, shape (stages * VARS,)
+        x in SI units, shape (stages * variables,)
         """
         for _ in range(SLICES):
             self._reader.mpc_solver_iterate(self._state, SLICE)

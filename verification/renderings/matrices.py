@@ -11,6 +11,8 @@ from qpmpc.qp.structure import QpStructure
 
 Floats = NDArray[np.float64]
 
+SAME = 1e-9  # distance of two rows of unit norm that are one and the same
+
 
 @dataclass(frozen=True)
 class Matrices:
@@ -71,8 +73,8 @@ def difference(one: Matrices, other: Matrices, column: Floats) -> float:
 
     Variables are counted in the units `column`; rows are brought to unit norm, and each is
     compared with the nearest row of the other program. Gradient and Hessian are relative to their
-    largest entries. The result is infinite if the numbers of rows differ, or two rows share a
-    partner.
+    largest entries. The result is infinite if the numbers of rows differ, or two rows that differ
+    share a partner.
     """
     worst = _relative(one.gradient * column, other.gradient * column)
     outer = np.multiply.outer(column, column)
@@ -106,9 +108,21 @@ def _signed(rows: Floats) -> Floats:
 
 
 def _unmatched(one: Floats, other: Floats) -> float:
+    (one, times), (other, other_times) = _distinct(one), _distinct(other)
     if len(one) != len(other):
         return float("inf")
     _, partner = KDTree(other).query(one)
-    if len(np.unique(partner)) != len(one):
+    if len(np.unique(partner)) != len(one) or np.any(times != other_times[partner]):
         return float("inf")
     return float(np.abs(one - other[partner]).max())
+
+
+def _distinct(rows: Floats) -> tuple[Floats, NDArray[np.intp]]:
+    """Rows that differ, and how often each occurs: a stage may have the same row twice."""
+    times, first = np.ones(len(rows), dtype=np.intp), np.arange(len(rows))
+    for i, j in sorted(KDTree(rows).query_pairs(SAME)):
+        if first[j] == j:
+            first[j] = first[i]
+            times[first[i]] += 1
+    kept = first == np.arange(len(rows))
+    return rows[kept], times[kept]

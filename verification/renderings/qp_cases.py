@@ -11,7 +11,7 @@ from qpmpc.controllers.base import Decision
 from qpmpc.controllers.mh_qp import MhQp
 from qpmpc.controllers.qp_planner import QpPlan, Solve
 from qpmpc.controllers.settings import ControllerSettings
-from qpmpc.qp.rows import VARS, Var
+from qpmpc.qp.rows import Var, table_of
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.plant import PlantState
 
@@ -28,7 +28,7 @@ class QpCase:
     Attributes
     ----------
     seen : step and state
-    x : plan that it is expanded about, SI units, shape (n, VARS)
+    x : plan that it is expanded about, SI units, shape (n, variables)
     """
 
     seen: Observation
@@ -57,14 +57,15 @@ def recorded_cases(trip: Trip, settings: ControllerSettings, every: int) -> Iter
 def random_cases(trip: Trip, stages: int, count: int, seed: int) -> Iterator[QpCase]:
     """Cases that may occur in no trip: any step, any state, any plan to expand about."""
     rng = np.random.default_rng(seed)
-    battery = trip.vehicle.battery
+    battery, variables = trip.vehicle.battery, table_of(trip.vehicle.engine).variables
     for _ in range(count):
         step = int(rng.integers(trip.steps))
         soc = float(rng.uniform(battery.soc_min, battery.soc_max))
         t_cl_degc = float(rng.uniform(*PLAN_T_CL_DEGC))
-        x = np.zeros((stages, VARS))
+        running = bool(rng.integers(2))
+        x = np.zeros((stages, len(variables)))
         x[:, Var.SOC] = rng.uniform(battery.soc_min, battery.soc_max, stages)
         x[:, Var.T_CL] = rng.uniform(*PLAN_T_CL_DEGC, stages)
         x[:, Var.P_ENG] = rng.uniform(*PLAN_P_ENG_W, stages)
         x[:, Var.FUEL] = rng.uniform(*PLAN_FUEL_G_PER_S, stages)
-        yield QpCase(trip.observation(step, PlantState(soc, t_cl_degc)), x)
+        yield QpCase(trip.observation(step, PlantState(soc, t_cl_degc, running)), x)
