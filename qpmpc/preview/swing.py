@@ -16,8 +16,8 @@ from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
 
-NO_LIMIT_J = 1e12
-"""Beyond any battery: of the classes inside a block, whose order in time is not known."""
+NO_LIMIT_J = 1e10
+"""Beyond any car's battery: of the classes inside a block, whose order in time is not known."""
 
 
 def swings(

@@ -97,7 +97,7 @@ def test_size_of_one_controller_is_as_documented() -> None:
 
 def test_estimated_milliseconds_follow_from_the_instructions() -> None:
     """To the tenth that is printed."""
-    counts = table()["admm", "f32", 50][0]
+    counts = table()["admm", "f32", 30][0]
     stated = {int(row[0].split()[0]): row[1:] for row in rows_of(EMBEDDED, 4) if "MHz" in row[0]}
     assert tuple(stated) == CLOCKS_MHZ
     for clock, cells in stated.items():

@@ -81,7 +81,7 @@ def test_hot_coolant_in_mild_weather_keeps_its_limit(vehicle):
 
 def test_the_relaxation_is_tight_and_nearly_integral(runs):
     summary = runs["nycc", "mh-qp"].summary()
-    assert summary["relaxation_gap"]["mean"] < 0.02  # 50 iterations, not a converged solution
+    assert summary["relaxation_gap"]["mean"] < 0.04  # 30 iterations, not a converged solution
     assert summary["sigma_integral_share"] > 0.95
 
 

@@ -105,7 +105,9 @@ def test_one_stage_optimum_is_the_model_itself():
     net = VEHICLE.battery.power_discharge_max_w + 10e3
     trace = Trace(np.array([net - VEHICLE.battery.aux_power_w]), np.array([20.0]))
     off = trace.internal_off_w(VEHICLE)
-    stages = Stages(np.array([1.0]), np.array([net]), np.array([20.0]), off, np.ones(1), *np.zeros((2, 1)))
+    stages = Stages(
+        np.array([1.0]), np.array([net]), np.array([20.0]), off, np.ones(1), *np.zeros((2, 1))
+    )
     qp = StageQp(VEHICLE, MODEL, 1, QpSettings(terminal_low=0.7), ScalingSettings())
     x, _ = _lowest(qp, qp.update(stages, 0.6, 60.0, _about(1, 60.0, 0.0)))
     sigma, p_eng = x[0, Var.ON], x[0, Var.P_ENG]
@@ -209,7 +211,9 @@ def test_limits_that_the_swing_closes_leave_one_soc():
     """Each at most half of the room: with the reserve the lower limit would pass the upper one."""
     stages = BUILDER.at(0)
     half = 0.5 * (VEHICLE.battery.soc_max - VEHICLE.battery.soc_min) * MODEL.battery_energy_j
-    closed = replace(stages, fall_j=np.full(BUILDER.count, half), rise_j=np.full(BUILDER.count, half))
+    closed = replace(
+        stages, fall_j=np.full(BUILDER.count, half), rise_j=np.full(BUILDER.count, half)
+    )
     qp = _qp(soc_reserve=0.5)
     data = qp.update(closed, 0.6, 60.0, _about())
     assert np.all(data.lower <= data.upper)
