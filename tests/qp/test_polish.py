@@ -1,4 +1,4 @@
-"""The first second at the plan's prices: the least of its cost, within its limits, or as planned."""
+"""The first second at the plan's prices: its least cost, within its limits, or as planned."""
 
 import numpy as np
 import pytest
@@ -60,7 +60,7 @@ def test_no_power_of_a_fine_grid_costs_less(name, fuel, p_eng, internal, net_w) 
 
 
 def test_it_is_an_optimum_that_moves_with_the_prices() -> None:
-    """Inside its limits and between kinks 1 W more or less costs more; dearer charge, more power."""
+    """Between limits and kinks 1 W more or less costs more; dearer charge, more power."""
     powers = []
     for internal in (5.8e-5, 6.0e-5, 6.3e-5):
         prices = Prices(1.0, 0.0, internal)
