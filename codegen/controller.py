@@ -47,6 +47,8 @@ class InputBuilder:
         into.long_speed_mps[:] = long.speed_mps.tolist()
         into.long_internal_off_w[:] = long.internal_off_w.tolist()
         into.long_rises[:] = long.rises.tolist()
+        into.long_fall_j[:] = long.fall_j.tolist()
+        into.long_rise_j[:] = long.rise_j.tolist()
 
 
 class GeneratedController(Controller):

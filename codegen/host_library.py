@@ -70,6 +70,8 @@ def structures(precision: Precision, short: int, long: int) -> tuple[Any, Any]:
             ("long_speed_mps", real * long),
             ("long_internal_off_w", real * long),
             ("long_rises", real * long),
+            ("long_fall_j", real * long),
+            ("long_rise_j", real * long),
             ("short_count", ctypes.c_int32),
             ("second", ctypes.c_int32),
             ("engine_on", ctypes.c_int32),

@@ -12,9 +12,9 @@ from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS
 from qpmpc.controllers.rule_based import last_rung
 from qpmpc.controllers.settings import MhQpSettings, RuleBasedSettings
 from qpmpc.errors import InputError
-from qpmpc.preview import checked
+from qpmpc.preview import checked, swing
 from qpmpc.pwa.model import PwaModel
-from qpmpc.qp import coolant_floor, linearisation, rows, stage_qp
+from qpmpc.qp import coolant_floor, linearisation, polish, rows, stage_qp
 from qpmpc.qp.quantities import pieces_of
 from qpmpc.qp.rows import Rows, Table, table_of
 from qpmpc.qp.stage_qp import qp_parameters
@@ -39,7 +39,9 @@ CONSTANTS: dict[str, dict[str, float]] = {
         (safety, "POWER_MARGIN_W SOC_MARGIN T_CL_MARGIN_K"),
         (monitor, "LONG_AGO_S LONGEST_GAP_S"),
         (checked, "LONGEST_STAGE_S NEWS"),
+        (swing, "NO_LIMIT_J"),
         (stage_qp, "LEAST_COST"),
+        (polish, "LEAST_RATIO"),
         (coolant_floor, "USABLE"),
         (rows, "SHORTEST_SCALE_S ACCURATE_STAGE_S SIGMA_FORCED MOOT_G_PER_S"),
         (base, "LARGEST_PLAUSIBLE"),
@@ -169,6 +171,7 @@ def values_of(
     grid = vehicle.battery.soc_grid
     arrays = {
         **pieces_of(model),
+        "fuel_begin_w": model.fuel.breakpoints[:-1],
         "alpha_slope": model.alpha.slope,
         "alpha_intercept": model.alpha.intercept,
         "alpha_break": model.alpha.breakpoints[:-1],
@@ -197,6 +200,7 @@ def values_of(
         departure_iterations=settings.admm.cold_iterations,
         duration_exponent=settings.scaling.duration_exponent,
         counts={
+            "polish": int(settings.polish),
             "min_on_s": vehicle.engine.min_on_s,
             "min_off_s": vehicle.engine.min_off_s,
             "rule_min_on_s": max(rules.min_on_s, vehicle.engine.min_on_s),

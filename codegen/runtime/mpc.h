@@ -47,6 +47,11 @@ typedef struct {
     mpc_real long_speed_mps[MPC_LONG];
     mpc_real long_internal_off_w[MPC_LONG];
     mpc_real long_rises[MPC_LONG];
+    /* of the last class of each block, the others are not read: energy, J, by which SOC at the end of
+     * the block stays off its lower and its upper limit, because it swings inside the block and the
+     * next (0 if it is not known) */
+    mpc_real long_fall_j[MPC_LONG];
+    mpc_real long_rise_j[MPC_LONG];
     int32_t short_count; /* seconds of the short preview before arrival, 1..MPC_SHORT */
     int32_t second;      /* clock: seconds since departure */
     int32_t engine_on;   /* measured: 1 if the engine ran in the last second, else 0 */

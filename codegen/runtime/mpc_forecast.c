@@ -71,6 +71,60 @@ static void sum_up(mpc_forecast *forecast)
     forecast->next = 0;
 }
 
+/* Internal battery power with the engine off; 0 in hard driving, in which the engine runs. */
+static mpc_real drained_w(mpc_real demand_w, int32_t is_hard)
+{
+    return (is_hard != 0) ? REAL(0.0) : mpc_map_planned_internal_w(battery_side_w(demand_w));
+}
+
+/* How far the battery's energy falls below and rises above where a block begins and ends, if the
+ * engine makes up evenly in hard driving for all the rest; everywhere in a block without any. */
+static mpc_swing swing_of(const mpc_forecast *forecast, int32_t first)
+{
+    const int32_t end = ((first + forecast->block_s) < forecast->covered)
+                            ? (first + forecast->block_s)
+                            : forecast->covered;
+    mpc_sum drained = {REAL(0.0), REAL(0.0)};
+    int32_t hard = 0;
+    for (int32_t second = first; second < end; second++) {
+        const mpc_real demand_w = forecast->trip.demand_w[second];
+        const int32_t is_hard = (demand_w > mpc_par.class_hard_w) ? 1 : 0;
+        add_to(&drained, drained_w(demand_w, is_hard));
+        hard += is_hard;
+    }
+    const int32_t all = (end > first) ? (end - first) : 1;
+    const mpc_real repaid_w = mean_of(&drained, (mpc_real)((hard > 0) ? hard : all));
+    mpc_swing swing = {REAL(0.0), REAL(0.0)};
+    mpc_sum level = {REAL(0.0), REAL(0.0)};
+    for (int32_t second = first; second < end; second++) {
+        const mpc_real demand_w = forecast->trip.demand_w[second];
+        const int32_t is_hard = (demand_w > mpc_par.class_hard_w) ? 1 : 0;
+        add_to(&level, -drained_w(demand_w, is_hard));
+        add_to(&level, ((is_hard != 0) || (hard == 0)) ? repaid_w : REAL(0.0));
+        const mpc_real now = level.sum + level.lost;
+        swing.fall_j = real_max(swing.fall_j, -now);
+        swing.rise_j = real_max(swing.rise_j, now);
+    }
+    return swing;
+}
+
+/* At the end of each block: a share of the swing in it and in the next, at most half of the room
+ * between the limits. An averaged preview knows nothing of it. */
+static void find_swings(mpc_forecast *forecast)
+{
+    const mpc_real room = mpc_par.soc_max - mpc_par.soc_min;
+    const mpc_real most_j = REAL(0.5) * room * mpc_par.battery_energy_j;
+    const mpc_real share = (MPC_CLASSES > 1) ? mpc_par.swing_share : REAL(0.0);
+    mpc_swing next = {REAL(0.0), REAL(0.0)};
+    for (int32_t block = MPC_BLOCKS - 1; block >= 0; block--) {
+        const mpc_swing own = swing_of(forecast, block * forecast->block_s);
+        mpc_swing *const kept = &forecast->swing[block];
+        kept->fall_j = real_min(share * real_max(own.fall_j, next.fall_j), most_j);
+        kept->rise_j = real_min(share * real_max(own.rise_j, next.rise_j), most_j);
+        next = own;
+    }
+}
+
 static int32_t is_believable(const mpc_road *trip)
 {
     int32_t fine = ((trip->steps >= 1) && (trip->steps <= MPC_LONGEST_TRIP_S)) ? 1 : 0;
@@ -100,6 +154,7 @@ int32_t mpc_forecast_start(mpc_forecast *forecast, const mpc_road *trip)
     forecast->block_s = block_s;
     forecast->covered = (steps < held) ? steps : held;
     sum_up(forecast);
+    find_swings(forecast);
     return (fine != 0) ? 0 : -1;
 }
 
@@ -147,6 +202,12 @@ static void fill_long(const mpc_forecast *forecast, int32_t is_arriving, mpc_in 
         in->long_net_w[k] = share * mean_of(&of->net_w, seconds);
         in->long_speed_mps[k] = share * mean_of(&of->speed_mps, seconds);
         in->long_rises[k] = (is_arriving != 0) ? REAL(0.0) : (mpc_real)of->rises;
+        const mpc_swing *const swing = &forecast->swing[k / MPC_CLASSES];
+        const int32_t block_end = ((k / MPC_CLASSES) + 1) * forecast->block_s;
+        const int32_t end = (block_end < forecast->covered) ? block_end : forecast->covered;
+        const int32_t is_ahead = ((is_arriving == 0) && (forecast->next < end)) ? 1 : 0;
+        in->long_fall_j[k] = (is_ahead != 0) ? swing->fall_j : REAL(0.0);
+        in->long_rise_j[k] = (is_ahead != 0) ? swing->rise_j : REAL(0.0);
         /* with one class the preview is averaged: it has only the mean demand */
 #if MPC_CLASSES > 1
         in->long_internal_off_w[k] = share * mean_of(&of->internal_off_w, seconds);

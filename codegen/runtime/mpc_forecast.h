@@ -44,6 +44,12 @@ typedef struct {
     mpc_sum internal_off_w;
 } mpc_class_sums;
 
+/* Energy, J, that the battery falls and rises. */
+typedef struct {
+    mpc_real fall_j;
+    mpc_real rise_j;
+} mpc_swing;
+
 /* Memory of one forecast. Its contents are private; the caller needs only its size. */
 typedef struct {
     uint32_t magic; /* tells a started forecast from any other memory, as does magic_end */
@@ -52,6 +58,7 @@ typedef struct {
     int32_t covered; /* seconds of the trip in the blocks */
     int32_t next;    /* first second that is still in the sums */
     mpc_class_sums ahead[MPC_LONG];
+    mpc_swing swing[MPC_BLOCKS]; /* kept from the SOC limits at the end of each block */
     uint32_t magic_end;
 } mpc_forecast;
 

@@ -29,6 +29,9 @@ void mpc_qp_linearise_about_plan(mpc_state *state);
 void mpc_qp_update(mpc_state *state);
 mpc_real mpc_qp_relaxation_gap(const mpc_stage *stage);
 
+/* mpc_polish.c: the first second at the plan's prices */
+mpc_real mpc_polish_power_w(const mpc_state *state, mpc_real planned_w);
+
 /* mpc_floor.c: coolant to be had in good time */
 void mpc_floor_find(mpc_state *state, mpc_real soc);
 

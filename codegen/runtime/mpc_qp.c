@@ -23,6 +23,8 @@ void mpc_qp_road(mpc_state *state, const mpc_in *in)
         stage->road.speed_mps = (seen != 0) ? in->short_speed_mps[k] : REAL(0.0);
         stage->road.internal_off_w = mpc_map_planned_internal_w(stage->road.net_w);
         stage->road.rises = (seen != 0) ? REAL(1.0) : REAL(0.0);
+        stage->road.fall_j = REAL(0.0);
+        stage->road.rise_j = REAL(0.0);
     }
     for (int32_t k = 0; k < MPC_LONG; k++) {
         mpc_stage *const stage = &state->stage[MPC_SHORT + k];
@@ -33,6 +35,10 @@ void mpc_qp_road(mpc_state *state, const mpc_in *in)
         /* what rises into a class, falls from it to the next stage, the class below */
         stage->road.rises = ((k % MPC_CLASSES) > 0) ? (-mpc_par.rise_share * in->long_rises[k - 1])
                                                     : REAL(0.0);
+        /* inside a block SOC is not limited: the order of its classes in time is not known */
+        const int32_t ends_block = ((k % MPC_CLASSES) == (MPC_CLASSES - 1)) ? 1 : 0;
+        stage->road.fall_j = (ends_block != 0) ? in->long_fall_j[k] : -NO_LIMIT_J;
+        stage->road.rise_j = (ends_block != 0) ? in->long_rise_j[k] : -NO_LIMIT_J;
     }
 }
 
@@ -50,6 +56,8 @@ void mpc_qp_road_move_up(mpc_state *state, int32_t by)
         road->speed_mps = seen * later->speed_mps;
         road->internal_off_w = seen * later->internal_off_w;
         road->rises = seen * later->rises;
+        road->fall_j = REAL(0.0);
+        road->rise_j = REAL(0.0);
     }
 }
 

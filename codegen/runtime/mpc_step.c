@@ -186,6 +186,11 @@ static void keep_plan(mpc_state *state)
         state->old_on_share[k] = state->stage[k].x[MPC_VAR_ON];
         state->old_p_eng_w[k] = state->stage[k].x[MPC_VAR_P_ENG];
     }
+    const mpc_real on_share = state->old_on_share[0];
+    if (on_share >= ON_THRESHOLD) {
+        const mpc_real share = real_min(on_share, REAL(1.0));
+        state->old_p_eng_w[0] = share * mpc_polish_power_w(state, state->old_p_eng_w[0] / share);
+    }
     state->old_age = 0;
 }
 

@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.controllers.monitor import Flag
-from qpmpc.controllers.receding_horizon import Plan, Planner, power_while_on_w
+from qpmpc.controllers.receding_horizon import ON_THRESHOLD, Plan, Planner, power_while_on_w
 from qpmpc.controllers.settings import MhQpSettings, SettingsLike
 from qpmpc.errors import InputError
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.linearisation import Linearisation
+from qpmpc.qp.polish import Polish
 from qpmpc.qp.rows import Var
 from qpmpc.qp.stage_qp import QpData, StageQp
 from qpmpc.solvers.base import QpSolution, QpSolver, Status, consistent, failed
@@ -117,6 +118,7 @@ class QpPlanner(Planner):
         self.qp = StageQp(
             vehicle, self.model, self.preview.count, self.of_qp.qp, self.of_qp.scaling
         )
+        self._polish = Polish(vehicle, self.model)
         self.last: QpPlan | None = None
         self._last_step = 0
         self._solves = 0
@@ -154,6 +156,10 @@ class QpPlanner(Planner):
         short = slice(self.of_qp.horizon.short_stages)
         on_share = solved.x[short, Var.ON]
         power_w = power_while_on_w(on_share, solved.x[short, Var.P_ENG])
+        if self.of_qp.polish and on_share[0] >= ON_THRESHOLD:
+            net_w = float(solved.stages.net_w[0])
+            prices = self.qp.prices(solved.duals)
+            power_w[0] = self._polish.power_w(prices, net_w, float(power_w[0]))
         return Plan(on_share, power_w, True, iterations, self._relaxation_gap(solved))
 
     def solve(self, seen: Observation) -> QpPlan:

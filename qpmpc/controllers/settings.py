@@ -71,6 +71,8 @@ class MhQpSettings(BaseModel):
     solver : QP backend of the Python implementation, see `qpmpc.solvers`. Not set: ADMM with the
         iterations of `admm`, which is OSQP in Python and our own code in C
     admm : settings if `solver` is not set, and of `osqp`
+    polish : minimise the coming second once more at the plan's prices of SOC and heat, on the
+        battery's own curve, see `qpmpc.qp.polish`
     prepared : solve the first QP before the trip starts; if not, the rules drive the first steps
         while the solver warms up
     """
@@ -84,11 +86,13 @@ class MhQpSettings(BaseModel):
     admm: AdmmSettings = AdmmSettings()
     implementation: Literal["auto", "c", "python"] = "auto"
     solver: str | None = None
+    polish: bool = True
     prepared: bool = True
 
 
 PAPER = MhQpSettings(
     implementation="python",
+    polish=False,
     horizon=HorizonSettings(short_stages=20, blocks=0, block_s=20, classes=1),
 )
 
@@ -119,6 +123,7 @@ class BaselineMpcSettings(BaseModel):
         """The same problem as a multi-horizon one without a long horizon."""
         return MhQpSettings(
             implementation="python",
+            polish=False,
             horizon=HorizonSettings(short_stages=self.horizon_s, blocks=0, block_s=0, classes=1),
             pwa=self.pwa,
             qp=self.qp,

@@ -8,7 +8,7 @@ import numpy as np
 from qpmpc.faults.models import Fault
 from qpmpc.preview.stages import Preview, Stages
 
-WILD_W, WILD_MPS, WILD_S = 1e6, 300.0, 1e4
+WILD_W, WILD_MPS, WILD_S, WILD_J = 1e6, 300.0, 1e4, 1e9
 
 
 def altered_signal(fault: Fault, second: int, history: list[Any]) -> Any:
@@ -57,7 +57,7 @@ def altered_preview(fault: Fault, second: int, first: Preview, now: Preview) -> 
 def _missing(now: Preview) -> Preview:
     """Return an empty message: nothing is driven."""
     short, long = np.zeros_like(now.short_demand_w), np.zeros_like(now.long.duration_s)
-    return Preview(short, short.copy(), 0, Stages(*np.zeros((5, len(long)))))
+    return Preview(short, short.copy(), 0, Stages(*np.zeros((7, len(long)))))
 
 
 def _wild(now: Preview, second: int) -> Preview:
@@ -74,6 +74,8 @@ def _wild(now: Preview, second: int) -> Preview:
             rng.uniform(0.0, WILD_MPS, long),
             rng.uniform(-WILD_W, WILD_W, long),
             rng.uniform(0.0, WILD_S, long),
+            rng.uniform(0.0, WILD_J, long),
+            rng.uniform(0.0, WILD_J, long),
         ),
     )
 

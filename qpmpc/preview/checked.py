@@ -4,6 +4,7 @@ The same in C: codegen/runtime/mpc_check.c and mpc_qp.c. Described in docs/safet
 """
 
 from collections.abc import Callable
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,6 +112,8 @@ class CheckedPreview:
             and _within(long.speed_mps, 0.0, can.speed_max_mps)
             and _within(long.internal_off_w, can.internal_min_w, can.internal_max_w)
             and _within(long.rises, 0.0, LONGEST_STAGE_S)
+            and _within(long.fall_j, 0.0, can.energy_j)
+            and _within(long.rise_j, 0.0, can.energy_j)
         )
 
     def _goes_on(self, preview: Preview, step: int) -> bool:
@@ -159,10 +162,8 @@ def _within(values: NDArray[np.float64], low: float, high: float) -> bool:
 
 def _moved_up(stages: Stages, by: int, n_short: int) -> Stages:
     """Short stages move up by some seconds and are masked at the end; long ones stay."""
-    fields = np.stack(
-        [stages.duration_s, stages.net_w, stages.speed_mps, stages.internal_off_w, stages.rises]
-    )
-    moved = fields.copy()
-    moved[:, : n_short - by] = fields[:, by:n_short]
+    now = np.stack([getattr(stages, field.name) for field in fields(stages)])
+    moved = now.copy()
+    moved[:, : n_short - by] = now[:, by:n_short]
     moved[:, n_short - by : n_short] = 0.0
     return Stages(*moved)

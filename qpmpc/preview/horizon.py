@@ -21,6 +21,8 @@ class HorizonSettings(BaseModel):
         the short one recedes to arrival
     classes : 3 demand classes per block (hard, easy, braking) or 1 (the mean, as in the paper)
     class_hard_w, class_braking_w : demand above the first is hard, below the second braking
+    swing_share : share of the swing that an engine in hard driving leads to, by which the SOC
+        limits at the end of a block are tightened, see `qpmpc.preview.swing`
     rise_share : starts that a block costs, per rise of its demand into a class and per on-share
         there. Less than 1: an engine that runs in part of a class does so in its longest episodes
     """
@@ -28,11 +30,12 @@ class HorizonSettings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     short_stages: Annotated[int, Field(ge=1, le=2000)] = 20
-    blocks: Annotated[int, Field(ge=0, le=BLOCKS_MAX)] = 7
+    blocks: Annotated[int, Field(ge=0, le=BLOCKS_MAX)] = 14
     block_s: Annotated[int, Field(ge=0, le=3600)] = 120
     classes: Literal[1, 3] = 3
     class_hard_w: Annotated[float, Field(ge=-1e6, le=1e6)] = 8000.0
     class_braking_w: Annotated[float, Field(ge=-1e6, le=1e6)] = -500.0
+    swing_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.85
     rise_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
 
     @model_validator(mode="after")

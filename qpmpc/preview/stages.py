@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from qpmpc.preview.forecast import Trace, internal_off_w
 from qpmpc.preview.horizon import HorizonSettings
+from qpmpc.preview.swing import NO_LIMIT_J, swings
 from qpmpc.vehicle.parameters import Vehicle
 
 FIELDS = 4  # of `Stages` that are means or sums of seconds
@@ -28,6 +29,8 @@ class Stages:
         more than l of the mean, which an averaged preview (one class) has to use
     rises : r_k, starts of the engine in the stage per on-share that it has more than the stage
         before: u_k >= r_k (sigma_k - sigma_k-1)
+    fall_j, rise_j : energy that SOC keeps from its lower and its upper limit at the stage's end,
+        see `qpmpc.preview.swing`; 0 for 1 s, -NO_LIMIT_J inside a block, where it is not limited
     """
 
     duration_s: NDArray[np.float64]
@@ -35,6 +38,8 @@ class Stages:
     speed_mps: NDArray[np.float64]
     internal_off_w: NDArray[np.float64]
     rises: NDArray[np.float64]
+    fall_j: NDArray[np.float64]
+    rise_j: NDArray[np.float64]
 
 
 class Preview(NamedTuple):
@@ -45,7 +50,8 @@ class Preview(NamedTuple):
     short_demand_w, short_speed_mps : of each of the coming N seconds, shape (N,)
     short_count : how many of them are driven before arrival
     long : statistics of the trip beyond, block by block, class by class; `rises`: how often the
-        demand rises into that class or past it
+        demand rises into that class or past it; `fall_j`, `rise_j`: of the block's end, read in
+        its last class alone
     """
 
     short_demand_w: NDArray[np.float64]
@@ -92,6 +98,7 @@ class StageBuilder:
         start = np.arange(settings.block_count(forecast.steps)) * block_s
         self._block_start = np.minimum(start, forecast.steps)
         self._block_end = np.minimum(start + block_s, forecast.steps)
+        self._swing_j = swings(forecast, vehicle, settings, self._block_start, self._block_end)
 
     def preview(self, step: int) -> Preview:
         """Return the trip ahead from time step `step`; short_count is 0 after arrival."""
@@ -100,11 +107,14 @@ class StageBuilder:
         start = self._long_start(now)
         fields = self._long_fields(start)
         rises = self._cumulative_rises[:, self._block_end] - self._cumulative_rises[:, start]
+        swing_j = np.repeat(
+            self._swing_j * (start < self._block_end), self.settings.classes, axis=1
+        )
         return Preview(
             self._demand_w[now : now + n],
             self._speed_mps[now : now + n],
             min(n, self.steps - now),
-            Stages(*np.vstack([fields, rises.T.ravel()])),
+            Stages(*np.vstack([fields, rises.T.ravel(), swing_j])),
         )
 
     def at(self, step: int) -> Stages:
@@ -122,7 +132,11 @@ class StageBuilder:
         rises = np.zeros(self.count)
         rises[:seen] = 1.0
         rises[n:] = starts_per_rise(long.rises, self.settings)
-        return Stages(*np.vstack([fields, rises]))
+        swing_j = np.zeros((2, self.count))
+        classes = self.settings.classes
+        ends_block = np.arange(len(long.fall_j)) % classes == classes - 1
+        swing_j[:, n:] = np.where(ends_block, (long.fall_j, long.rise_j), -NO_LIMIT_J)
+        return Stages(*np.vstack([fields, rises, swing_j]))
 
     def _long_start(self, step: int) -> NDArray[np.intp]:
         """First second of each block beyond the short horizon; its end where there is none."""
@@ -203,9 +217,7 @@ def _cumulative_rises(demand_class: NDArray[np.intp], classes: int) -> NDArray[n
     return sums
 
 
-def starts_per_rise(
-    rises: NDArray[np.float64], settings: HorizonSettings
-) -> NDArray[np.float64]:
+def starts_per_rise(rises: NDArray[np.float64], settings: HorizonSettings) -> NDArray[np.float64]:
     """Rises into each class of a block as `Stages.rises`, for stages from hard down to braking.
 
     A rise into a class starts the engine if it runs there and not below. The class below is the

@@ -68,16 +68,17 @@ missing_w = net_w - battery_discharge_max_w
 # fuel above its curve would be heat without power: none where heat has to be had in good time
 waste_g_per_s = where(highest_floor_degc > t_min_degc, 0.0, MOOT_G_PER_S)
 
-# SOC limits with the reserve of forecast stages and the terminal band, no higher than charging all
-# the way leads to: a limit above that is moot
+# SOC limits with the reserve of forecast stages, tightened by the swing inside a block, and the
+# terminal band, no higher than charging all the way leads to: a limit above that is moot
 strongest_w = max(net_w - engine_max_w, -battery_charge_max_w)
 spent_soc = running(duration_s * pwa_battery(strongest_w) / battery_energy_j)
 reach_soc = start_soc - spent_soc - reach_margin_soc
-limit_soc = soc_min + where(duration_s > ACCURATE_STAGE_S, soc_reserve, 0.0)
+limit_soc = soc_min + fall_j / battery_energy_j + where(duration_s > ACCURATE_STAGE_S, soc_reserve, 0.0)
+top_soc = soc_max - rise_j / battery_energy_j
 last_low_soc = where(soc_penalty_g > 0.0, limit_soc, terminal_soc_low)
-last_high_soc = where(soc_penalty_g > 0.0, soc_max, terminal_soc_high)
+last_high_soc = where(soc_penalty_g > 0.0, top_soc, terminal_soc_high)
 soc_low = min(where(is_last > 0.0, last_low_soc, limit_soc) - origin_soc, reach_soc)
-soc_high = where(is_last > 0.0, last_high_soc, soc_max) - origin_soc
+soc_high = max(where(is_last > 0.0, last_high_soc, top_soc) - origin_soc, soc_low)
 
 # heat into the coolant, expanded about (T^, F^, E^), T_mean the mean of the stage's ends:
 # q = (1 - x) [LHV (alpha F + growth (T_mean - T^)) - E] - UA (T_mean - T_amb) - Q_cabin

@@ -14,6 +14,7 @@ from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.expressions import code_of, expression
 from qpmpc.qp.heat_reserve import heat_reserve_k
 from qpmpc.qp.linearisation import Linearisation
+from qpmpc.qp.polish import Prices
 from qpmpc.qp.quantities import Quantities
 from qpmpc.qp.rows import SHORTEST_SCALE_S, VARIABLES, Rows, Var, table_of
 from qpmpc.qp.scaling import Scaling, ScalingSettings
@@ -187,6 +188,15 @@ class StageQp:
             for entry in row.terms
             if entry.before
         ]
+        self._cost = np.zeros((stages, len(self.table.variables)))
+        self._dynamics = [
+            (
+                self.rows.first(row.name),
+                {e.var: self.structure.places(row, e).start for e in row.terms if not e.before},
+            )
+            for row in self.table.rows
+            if row.is_equality
+        ]
         self._weights = [(entry, code_of(factor)) for entry, factor in self.table.cost.items()]
         variables = self.table.variables
         self._hessian = np.full((stages, len(variables)), settings.regularisation)
@@ -239,13 +249,29 @@ class StageQp:
         for place, formula in self._each_step:
             place[:] = value(formula)
         self._start_at({Var.SOC: soc, Var.T_CL: t_cl_degc, Var.ON: 0.0})  # on: in the bound
-        cost = np.zeros((self.stages, len(self.table.variables)))
+        cost = self._cost = np.zeros((self.stages, len(self.table.variables)))
         for entry, weight in self._weights:
             if entry.before:
                 cost[:-1, [entry.var]] += np.broadcast_to(value(weight), (self.stages, 1))[1:]
             else:
                 cost[:, [entry.var]] += value(weight)
         return self._scaled(stages.duration_s, cost)
+
+    def prices(self, duals: Floats) -> Prices:
+        """Return what the rates of the first second cost at the last update's values.
+
+        Parameters
+        ----------
+        duals : of all rows, g of fuel per SI unit, shape (n, rows)
+        """
+        found = []
+        for var in (Var.FUEL, Var.P_ENG, Var.INTERNAL):
+            price = self._cost[0, var]
+            for place, terms in self._dynamics:
+                if var in terms:
+                    price += duals[0, place] * self._values[0, terms[var]]
+            found.append(float(price))
+        return Prices(*found)
 
     def _start_at(self, state: dict[Var, float]) -> None:
         """Put the state now, which is not a variable, into the bounds of the first stage."""

@@ -31,6 +31,7 @@ class Capability:
     speed_max_mps : top speed
     net_min_w, net_max_w : of the mean net power P0 of a long stage
     internal_min_w, internal_max_w : of the mean battery power with the engine off of a long stage
+    energy_j : of a full battery, at the voltage of the initial SOC
     """
 
     hottest_degc: float
@@ -44,6 +45,7 @@ class Capability:
     net_max_w: float
     internal_min_w: float
     internal_max_w: float
+    energy_j: float
 
     @classmethod
     def of(cls, vehicle: Vehicle, line: OptimalLine) -> "Capability":
@@ -70,6 +72,7 @@ class Capability:
             net_max_w=most_w + ROUNDING_W,
             internal_min_w=inner[1] - ROUNDING_W,
             internal_max_w=inner[0] + ROUNDING_W,
+            energy_j=maps.energy_j(at_init),
         )
 
 

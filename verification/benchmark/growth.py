@@ -36,7 +36,7 @@ def growth(vehicle: Vehicle) -> list[dict[str, Any]]:
     for count in STAGES:
         at = np.arange(count) % trace.steps
         each = np.ones(count)
-        stages = Stages(each, net[at], speed[at], off[at], each)
+        stages = Stages(each, net[at], speed[at], off[at], each, 0.0 * each, 0.0 * each)
         about = Linearisation.constant(count, 60.0)
         qp = StageQp(vehicle, model, count, settings.qp, settings.scaling)
         solver = Osqp(settings.admm)

@@ -28,6 +28,7 @@ class Horizon:
     """Duration (s), P0 (W), mean speed (m/s) and mean l(P0) (W) of each stage; shape (n,).
 
     `rises`: starts in the stage for an on-share that is one more than that of the stage before.
+    `low_j`, `high_j`: energy to keep from the SOC limits, -inf where there is none.
     """
 
     h: Floats
@@ -35,6 +36,8 @@ class Horizon:
     speed_mps: Floats
     off_w: Floats
     rises: Floats
+    low_j: Floats
+    high_j: Floats
 
 
 def horizon(cycle: Cycle, vehicle: Vehicle, settings: MhQpSettings, step: int) -> Horizon:
@@ -53,7 +56,7 @@ def horizon(cycle: Cycle, vehicle: Vehicle, settings: MhQpSettings, step: int) -
     n, length = grid.short_stages, -(-steps // grid.blocks)
     rows: list[list[float]] = []
     for t in range(step, step + n):
-        rows.append([1.0, net[t], speed[t], off[t], 1.0] if t < steps else [0.0] * 5)
+        rows.append([1.0, net[t], speed[t], off[t], 1.0, 0.0, 0.0] if t < steps else [0.0] * 7)
     for block in range(grid.blocks):
         seconds = range(max(block * length, step + n), min((block + 1) * length, steps))
         classes: list[list[int]] = [[], [], []]
@@ -64,8 +67,40 @@ def horizon(cycle: Cycle, vehicle: Vehicle, settings: MhQpSettings, step: int) -
         off_braking = [t for t in seconds if demand[t - 1] < grid.class_braking_w <= demand[t]]
         for member, entries in zip(classes, ([], into_hard, off_braking), strict=True):
             means = [float(np.mean(a[member])) for a in (net, speed, off)] if member else [0.0] * 3
-            rows.append([float(len(member)), *means, -grid.rise_share * len(entries)])
+            swing = [-np.inf, -np.inf]  # inside a block SOC is not limited
+            rows.append([float(len(member)), *means, -grid.rise_share * len(entries), *swing])
+        if (block + 1) * length > step + n < steps and block * length < steps:
+            rows[-1][5:] = _kept_j(block * length, length, off, demand, vehicle, settings)
+        else:
+            rows[-1][5:] = [0.0, 0.0]
     return Horizon(*np.array(rows).T)
+
+
+def _kept_j(
+    first: int,
+    length: int,
+    off_w: Floats,
+    demand_w: Floats,
+    vehicle: Vehicle,
+    settings: MhQpSettings,
+) -> list[float]:
+    """Energy kept from both SOC limits at the end of a block: of the swing in it and in the next.
+
+    The engine rests outside hard driving, and makes up for all of it evenly in hard driving.
+    """
+    battery, kept = vehicle.battery, [0.0, 0.0]
+    for begin in (first, first + length):
+        seconds = range(begin, min(begin + length, len(demand_w)))
+        hard = [t for t in seconds if demand_w[t] > settings.horizon.class_hard_w]
+        drained = sum(off_w[t] for t in seconds if t not in hard)
+        level = 0.0
+        for t in seconds:
+            level -= 0.0 if t in hard else off_w[t]
+            level += drained / len(hard or seconds) if not hard or t in hard else 0.0
+            kept = [max(kept[0], -level), max(kept[1], level)]
+    volts = float(Equations(vehicle).voltage_v(vehicle.trip.soc_init))
+    half = 0.5 * (battery.soc_max - battery.soc_min) * volts * 3600.0 * battery.capacity_ah
+    return [min(settings.horizon.swing_share * each, half) for each in kept]
 
 
 class Expansion(NamedTuple):
@@ -330,14 +365,18 @@ def stage_program(
         strongest = max(net - engine.power_max_w, -battery.power_charge_max_w)
         charged = float(np.max(curves.battery.slope * strongest + curves.battery.intercept))
         reach -= h * charged / energy
-        low, high = battery.soc_min, battery.soc_max
+        low = battery.soc_min + float(road.low_j[k]) / energy
+        high = battery.soc_max - float(road.high_j[k]) / energy
         if h > 1.0:  # forecast: a reserve is left
-            low += qp.soc_reserve * max(vehicle.trip.soc_init - low, 0.0)
+            low += qp.soc_reserve * max(vehicle.trip.soc_init - battery.soc_min, 0.0)
         if k == n - 1:
             low = max(qp.terminal_low * vehicle.trip.soc_init, battery.soc_min)
-            high = min(qp.terminal_high * vehicle.trip.soc_init, high)
-        rows.add("SOC max", high, {at[SOC]: 1.0})
-        rows.add("SOC min", -min(low, reach - 1e-5 - crank_j / energy), {at[SOC]: -1.0})
+            high = min(qp.terminal_high * vehicle.trip.soc_init, battery.soc_max)
+        low = min(low, reach - 1e-5 - crank_j / energy)
+        if np.isfinite(high):
+            rows.add("SOC max", max(high, low), {at[SOC]: 1.0})
+        if np.isfinite(low):
+            rows.add("SOC min", -low, {at[SOC]: -1.0})
         rows.add("coolant min", -float(floor[k]), {at[T_CL]: -1.0, at[T_SLACK]: -1.0})
         rows.add("coolant max", th.t_cl_max_degc - 0.05, {at[T_CL]: 1.0, at[T_SLACK]: -1.0})
         rows.add("slack", 0.0, {at[T_SLACK]: -1.0})
@@ -349,6 +388,5 @@ def stage_program(
             rows.add("starts", rise * state[2] if k == 0 else 0.0, terms)
             rows.add("no negative starts", 0.0, {at[START]: -1.0})
     return StageProgram(
-        n,
-        cost, np.array(same.a), np.array(same.b), np.array(rows.a), np.array(rows.b), rows.names
+        n, cost, np.array(same.a), np.array(same.b), np.array(rows.a), np.array(rows.b), rows.names
     )

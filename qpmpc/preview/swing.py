@@ -1,0 +1,74 @@
+"""What the battery's energy swings inside a block, which its statistics do not tell.
+
+Inside a long block braking fills the battery and launches drain it. A plan that knows only where
+the block ends would end it at a limit; on the road the braking energy is then thrown away. So two
+numbers of each block's end go with its statistics: how far below and above it the battery's energy
+comes, there and before the block's own end.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpmpc.preview.forecast import Trace
+from qpmpc.preview.horizon import HorizonSettings
+from qpmpc.vehicle.battery import BatteryMaps
+from qpmpc.vehicle.parameters import Vehicle
+
+Floats = NDArray[np.float64]
+
+NO_LIMIT_J = 1e12
+"""Beyond any battery: of the classes inside a block, whose order in time is not known."""
+
+
+def swings(
+    forecast: Trace,
+    vehicle: Vehicle,
+    settings: HorizonSettings,
+    start: NDArray[np.intp],
+    end: NDArray[np.intp],
+) -> Floats:
+    """Energy to keep from the lower and from the upper SOC limit at the end of each block, J.
+
+    With l the internal power with the engine off, from the start of a block to each t in it,
+
+        path(t) = sum of -l outside hard driving, and of a constant in hard driving (everywhere,
+                  where there is none) with which the path ends where it began
+
+    is what an engine leads to that runs in hard driving. It can be run so that the battery swings
+    less: of block b and the next, which begins there, a share s is kept,
+
+        fall_b = s max(-min path_b, -min path_b+1),   rise_b = s max(max path_b, max path_b+1)
+
+    each at most half of the room between the limits. One class has no swing: an averaged preview
+    knows nothing of it.
+
+    Parameters
+    ----------
+    forecast : of the whole trip
+    start, end : first second of each block and that after its last, shape (blocks,)
+
+    Returns
+    -------
+    fall and rise, shape (2, blocks)
+    """
+    if settings.classes == 1 or not len(start):
+        return np.zeros((2, len(start)))
+    flow_w = -forecast.internal_off_w(vehicle)
+    is_hard = forecast.demand_w > settings.class_hard_w
+    own = np.array([_swing(flow_w[a:b], is_hard[a:b]) for a, b in zip(start, end, strict=True)]).T
+    following = np.append(own[:, 1:], np.zeros((2, 1)), axis=1)
+    battery = vehicle.battery
+    room = battery.soc_max - battery.soc_min
+    most = 0.5 * room * BatteryMaps(battery).energy_j(vehicle.trip.soc_init)
+    kept: Floats = np.minimum(settings.swing_share * np.maximum(own, following), most)
+    return kept
+
+
+def _swing(flow_w: Floats, is_hard: NDArray[np.bool_]) -> tuple[float, float]:
+    """Largest fall and rise of `path` in one block of 1 s steps, J."""
+    if not len(flow_w):
+        return 0.0, 0.0
+    repaid = is_hard if is_hard.any() else np.ones_like(is_hard)
+    kept_w = np.where(is_hard, 0.0, flow_w)
+    path = np.cumsum(kept_w - kept_w.sum() / repaid.sum() * repaid)
+    return max(-path.min(), 0.0), max(path.max(), 0.0)
