@@ -127,19 +127,20 @@ def _spoilt(preview: Preview, rng: np.random.Generator) -> Preview:
     if kind == 0:
         return preview._replace(short_count=int(rng.choice([-1, 0, 3, 21, 10**6])))
     long = preview.long
-    fields = [long.duration_s, long.net_w, long.speed_mps, long.internal_off_w]
+    fields = list(vars(long).values())
     if kind == 1:
         demand = preview.short_demand_w.copy()
         demand[rng.integers(len(demand))] = rng.choice(NUMBERS)
         return preview._replace(short_demand_w=demand)
     if kind == 2:
-        at = rng.integers(4)
+        at = rng.integers(len(fields))
         fields[at] = fields[at].copy()
         fields[at][rng.integers(len(fields[at]))] = rng.choice(NUMBERS)
     else:
         n = len(long.duration_s)
         fields = [rng.uniform(0, 60, n), *(rng.uniform(-2e4, 3e4, n) for _ in range(3))]
         fields[2] = np.abs(fields[2]) * 1e-3
+        fields += [rng.uniform(0, 5, n), *(rng.uniform(0, 1e6, n) for _ in range(2))]
     return preview._replace(long=Stages(*fields))
 
 
