@@ -29,9 +29,9 @@ ALGORITHMS: tuple[Algorithm, ...] = ("admm", "osqp")
 # problem the project's budget; OSQP takes more, see docs/embedded.md.
 MEMORY_KB: dict[tuple[Algorithm, Precision], tuple[int, int]] = {
     ("admm", "f32"): (128, 96),
-    ("admm", "f64"): (128, 96),
-    ("osqp", "f32"): (256, 256),
-    ("osqp", "f64"): (512, 512),
+    ("admm", "f64"): (128, 160),
+    ("osqp", "f32"): (512, 384),
+    ("osqp", "f64"): (512, 768),
 }
 
 Name = TypeVar("Name", bound=str)

@@ -14,7 +14,7 @@ from qpmpc.trip import Trip
 from qpmpc.verification.dynamic_programming import DpSettings, solve_dp
 from qpmpc.verification.dynamic_programming.controller import as_fraction
 
-ITERATIONS = (10, 25, 50, 100)
+ITERATIONS = (10, 30, 50, 100)
 Job = Callable[[str], Progress]
 
 

@@ -29,9 +29,11 @@ TWO_HOURS_S = 7200
 
 POWERS = ("demand_w", "short_demand_w", "long_net_w", "long_internal_off_w")
 SPEEDS = ("speed_mps", "short_speed_mps", "long_speed_mps")
+SWINGS = ("long_fall_j", "long_rise_j")
 # f64: Python takes differences of a running sum over the whole trip, 1e8 at most, whose last digit
-# is 1e-8; C does not. f32: two units in the last place of 60 kW (0.004 W) and of 40 m/s (4e-6 m/s).
-TOLERANCE = {"f64": (1e-9, 1e-6, 1e-9), "f32": (0.0, 0.01, 1e-5)}  # relative, W, m/s
+# is 1e-8; C does not. f32: two units in the last place of 60 kW (0.004 W) and of 40 m/s (4e-6 m/s);
+# a swing adds up the 500 s of a block at most.
+TOLERANCE = {"f64": (1e-9, 1e-6, 1e-9, 1e-6), "f32": (0.0, 0.01, 1e-5, 1.0)}  # rel., W, m/s, J
 
 
 def library_of(precision: str, settings: ControllerSettings = SETTINGS, blocks=None, vehicle=CAR):
@@ -70,7 +72,7 @@ def assert_same_inputs(
     preview = StageBuilder(CAR, truth, said or truth, settings.mh_qp.horizon)
     python, ours = InputBuilder(preview.preview), ForecastInputs(library, truth, said)
     want, have = library.input_type(), library.input_type()
-    relative, power_w, speed_mps = TOLERANCE[library.precision]
+    relative, power_w, speed_mps, energy_j = TOLERANCE[library.precision]
     for step in range(truth.steps) if steps is None else steps:
         ctypes.memset(ctypes.byref(have), 0xFF, ctypes.sizeof(have))  # everything is written
         python.fill(observed(truth, step), want)
@@ -78,7 +80,7 @@ def assert_same_inputs(
         assert have.short_count == want.short_count
         assert list(have.long_duration_s) == list(want.long_duration_s)
         assert list(have.long_rises) == list(want.long_rises)
-        for names, absolute in ((POWERS, power_w), (SPEEDS, speed_mps)):
+        for names, absolute in ((POWERS, power_w), (SPEEDS, speed_mps), (SWINGS, energy_j)):
             np.testing.assert_allclose(
                 numbers(have, names), numbers(want, names), rtol=relative, atol=absolute
             )

@@ -46,7 +46,7 @@ def two_stages(h, net_w, speed_mps, t_degc, fuel, power):
     pair = np.ones(2)
     off_w = EQUATIONS.internal_w(CAR.trip.soc_init, net_w)
     stages = Stages(
-        h * pair, net_w * pair, speed_mps * pair, float(off_w) * pair, pair, *np.zeros((2, 2))
+        h * pair, net_w * pair, speed_mps * pair, float(off_w) * pair, pair, 0.0 * pair, 0.0 * pair
     )
     at = t_degc * pair
     return stages, Linearisation(at, fuel * pair, power * pair, at, at)

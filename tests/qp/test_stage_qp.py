@@ -1,5 +1,7 @@
 """The QP: fixed structure, consistent scaling, and the mathematics it claims."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.optimize
@@ -175,9 +177,43 @@ def test_forecast_stages_keep_a_reserve_of_charge_and_known_ones_do_not():
     lower = (data.lower / data.scaling.row).reshape(qp.stages, -1)
     planned = lower[:, qp.rows.first("box_soc")]
     battery, trip = VEHICLE.battery, VEHICLE.trip
-    reserved = battery.soc_min + 0.5 * (trip.soc_init - battery.soc_min)
-    swing = stages.fall_j[:-1] / MODEL.battery_energy_j
-    assert planned[:-1] == pytest.approx(
-        np.where(stages.duration_s[:-1] > 1.0, reserved, battery.soc_min) + swing
-    )
+    reserved = np.where(stages.duration_s > 1.0, 0.5 * (trip.soc_init - battery.soc_min), 0.0)
+    expected = battery.soc_min + reserved + stages.fall_j / MODEL.battery_energy_j
+    assert planned[:-1] == pytest.approx(expected[:-1])
     assert planned[-1] == pytest.approx(trip.soc_init)
+
+
+def test_soc_keeps_the_swing_from_its_limits_at_the_ends_of_blocks_alone():
+    qp = _qp(soc_reserve=0.0)
+    stages = BUILDER.at(0)
+    data = qp.update(stages, 0.6, 60.0, _about())
+    row = qp.rows.first("box_soc")
+    low, high = (
+        (bound / data.scaling.row).reshape(qp.stages, -1)[:-1, row]
+        for bound in (data.lower, data.upper)
+    )
+    short = BUILDER.settings.short_stages
+    battery = VEHICLE.battery
+    assert low[:short] == pytest.approx(battery.soc_min)
+    assert high[:short] == pytest.approx(battery.soc_max)
+    ends = np.arange(short + 2, qp.stages - 1, 3)
+    inside = np.setdiff1d(np.arange(short, qp.stages - 1), ends)
+    assert np.all(low[inside] < 0.0)  # no limit that a battery knows
+    assert np.all(high[inside] > 1.0)
+    assert np.all(low[ends] < high[ends])
+    energy = MODEL.battery_energy_j
+    assert battery.soc_min + stages.fall_j[ends] / energy == pytest.approx(low[ends])
+    assert battery.soc_max - stages.rise_j[ends] / energy == pytest.approx(high[ends])
+    assert stages.fall_j[ends].max() > 0.0 < stages.rise_j[ends].max()
+
+
+def test_limits_that_the_swing_closes_leave_one_soc():
+    """Each at most half of the room: with the reserve the lower limit would pass the upper one."""
+    stages = BUILDER.at(0)
+    half = 0.5 * (VEHICLE.battery.soc_max - VEHICLE.battery.soc_min) * MODEL.battery_energy_j
+    closed = replace(
+        stages, fall_j=np.full(BUILDER.count, half), rise_j=np.full(BUILDER.count, half)
+    )
+    qp = _qp(soc_reserve=0.5)
+    data = qp.update(closed, 0.6, 60.0, _about())
+    assert np.all(data.lower <= data.upper)

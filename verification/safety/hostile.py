@@ -1,7 +1,7 @@
 """A hostile drive: broken sensors, clocks and previews, restarts; C and Python side by side."""
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from math import inf, isfinite, nan
 
 import numpy as np
@@ -127,21 +127,20 @@ def _spoilt(preview: Preview, rng: np.random.Generator) -> Preview:
     if kind == 0:
         return preview._replace(short_count=int(rng.choice([-1, 0, 3, 21, 10**6])))
     long = preview.long
-    fields = list(vars(long).values())
+    values = list(astuple(long))  # copies
     if kind == 1:
         demand = preview.short_demand_w.copy()
         demand[rng.integers(len(demand))] = rng.choice(NUMBERS)
         return preview._replace(short_demand_w=demand)
     if kind == 2:
-        at = rng.integers(len(fields))
-        fields[at] = fields[at].copy()
-        fields[at][rng.integers(len(fields[at]))] = rng.choice(NUMBERS)
+        at = rng.integers(len(values))
+        values[at][rng.integers(len(values[at]))] = rng.choice(NUMBERS)
     else:
         n = len(long.duration_s)
-        fields = [rng.uniform(0, 60, n), *(rng.uniform(-2e4, 3e4, n) for _ in range(3))]
-        fields[2] = np.abs(fields[2]) * 1e-3
-        fields += [rng.uniform(0, 5, n), *(rng.uniform(0, 1e6, n) for _ in range(2))]
-    return preview._replace(long=Stages(*fields))
+        values = [rng.uniform(0, 60, n), *(rng.uniform(-2e4, 3e4, n) for _ in range(3))]
+        values[2] = np.abs(values[2]) * 1e-3
+        values += [rng.uniform(0, 60, n), *(rng.uniform(0, 3e6, n) for _ in range(2))]
+    return preview._replace(long=Stages(*values))
 
 
 def _disagreement(mine: Decision, its: Decision, vehicle: Vehicle) -> str:

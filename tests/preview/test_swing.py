@@ -1,0 +1,109 @@
+"""The swing inside a block: by hand, within its cap, and nothing of it in an averaged preview."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from qpmpc.cycles import load_cycle
+from qpmpc.preview import HorizonSettings, StageBuilder, Trace
+from qpmpc.preview.swing import NO_LIMIT_J, swings
+from qpmpc.vehicle import load_vehicle
+from qpmpc.verification.independent.equations import Equations
+
+CAR = load_vehicle()
+NYCC = Trace.of(load_cycle("nycc"), CAR)
+AUX_W = CAR.battery.aux_power_w
+HARD_W, EASY_W, BRAKING_W = 20e3, 5e3, -9e3
+
+
+def stored_j(demand_w: float) -> float:
+    """What leaves the store in a second with the engine off, by the equations written twice."""
+    return float(Equations(CAR).internal_w(CAR.trip.soc_init, demand_w + AUX_W))
+
+
+EASY_J, BRAKED_J = stored_j(EASY_W), -stored_j(BRAKING_W)  # out of the store, into it
+ROOM_J = (
+    (CAR.battery.soc_max - CAR.battery.soc_min)
+    * float(Equations(CAR).voltage_v(CAR.trip.soc_init))
+    * CAR.battery.capacity_ah
+    * 3600.0
+)
+
+
+def of_blocks(*blocks: list[float], **changed: float) -> np.ndarray:
+    """Fall and rise of blocks of these demands, J."""
+    demand = np.concatenate([np.asarray(block) for block in blocks])
+    ends = np.cumsum([len(block) for block in blocks])
+    starts = ends - [len(block) for block in blocks]
+    layout = HorizonSettings(**{"swing_share": 1.0, **changed})
+    return swings(Trace(demand, np.full(len(demand), 10.0)), CAR, layout, starts, ends)
+
+
+def test_an_engine_in_hard_driving_makes_up_for_the_rest() -> None:
+    # -B, -2B, -2B + A, and the hard second leads back to 0
+    fall, rise = of_blocks([EASY_W, EASY_W, BRAKING_W, HARD_W])
+    assert fall[0] == pytest.approx(2.0 * EASY_J)
+    assert rise[0] == pytest.approx(max(BRAKED_J - 2.0 * EASY_J, 0.0), abs=1e-6)
+    # A, then two hard seconds take half of A - B each, then B out of the store
+    fall, rise = of_blocks([BRAKING_W, HARD_W, HARD_W, EASY_W])
+    assert fall[0] == pytest.approx(0.0, abs=1e-6)
+    assert rise[0] == pytest.approx(max(BRAKED_J, EASY_J))
+
+
+def test_without_hard_driving_all_seconds_make_up_for_the_rest() -> None:
+    fall, rise = of_blocks([EASY_W, EASY_W, BRAKING_W])
+    mean = (2.0 * EASY_J - BRAKED_J) / 3.0
+    path = [mean - EASY_J, 2.0 * (mean - EASY_J), 0.0]
+    assert fall[0] == pytest.approx(-min(path))
+    assert rise[0] == pytest.approx(max(path), abs=1e-6)
+
+
+def test_the_end_of_a_block_keeps_what_the_next_needs_too() -> None:
+    falling, rising = [EASY_W, HARD_W], [BRAKING_W, HARD_W]
+    np.testing.assert_allclose(
+        of_blocks(falling, rising, falling),
+        [[EASY_J, EASY_J, EASY_J], [BRAKED_J, BRAKED_J, 0.0]],
+        atol=1e-6,
+    )
+
+
+def test_a_share_is_kept_and_at_most_half_of_the_room() -> None:
+    one = of_blocks([EASY_W, HARD_W], swing_share=0.3)
+    np.testing.assert_allclose(one, [[0.3 * EASY_J], [0.0]], atol=1e-6)
+    many = int(ROOM_J / min(EASY_J, BRAKED_J)) + 1
+    fall, _ = of_blocks([EASY_W] * many + [HARD_W])
+    _, rise = of_blocks([BRAKING_W] * many + [HARD_W])
+    assert fall[0] == pytest.approx(0.5 * ROOM_J)
+    assert rise[0] == pytest.approx(0.5 * ROOM_J)
+
+
+def test_constant_demand_and_a_passed_block_swing_not() -> None:
+    steady = [EASY_W, EASY_W, EASY_W]
+    np.testing.assert_allclose(of_blocks(steady, [HARD_W]), 0.0, atol=1e-6)
+    np.testing.assert_array_equal(of_blocks([EASY_W, HARD_W], [])[:, 1], 0.0)
+
+
+def test_an_averaged_preview_knows_no_swing() -> None:
+    assert not of_blocks([EASY_W, HARD_W, BRAKING_W], classes=1).any()
+    stages = StageBuilder(CAR, NYCC, NYCC, HorizonSettings(classes=1)).at(0)
+    assert not stages.fall_j.any()
+    assert not stages.rise_j.any()
+
+
+@settings(max_examples=60, deadline=None)
+@given(step=st.integers(0, NYCC.steps - 1), short=st.integers(1, 30), blocks=st.integers(1, 40))
+def test_soc_is_limited_at_the_ends_of_blocks_that_lie_ahead(step, short, blocks) -> None:
+    layout = HorizonSettings(short_stages=short, blocks=blocks)
+    builder = StageBuilder(CAR, NYCC, NYCC, layout)
+    stages = builder.at(step)
+    length = layout.block_length_s(NYCC.steps)
+    start = np.minimum(np.arange(blocks) * length, NYCC.steps)
+    end = np.minimum(start + length, NYCC.steps)
+    of_end = swings(NYCC, CAR, layout, start, end)
+    ahead = (end > step + short) & (start < end) & (step + short < NYCC.steps)
+    for found, kept in ((stages.fall_j, of_end[0]), (stages.rise_j, of_end[1])):
+        np.testing.assert_array_equal(found[:short], 0.0)  # seconds are known one by one
+        of_class = found[short:].reshape(blocks, 3)
+        np.testing.assert_array_equal(of_class[:, :2], -NO_LIMIT_J)
+        np.testing.assert_array_equal(of_class[:, 2], kept * ahead)
