@@ -9,12 +9,12 @@ from typing import Any
 from qpmpc.codegen.pil.loop import PilResult
 from qpmpc.codegen.pil.pareto import Pareto
 from qpmpc.controllers.monitor import Flag
+from qpmpc.controllers.settings import MhQpSettings
 from qpmpc.files import json_text, write_bytes, write_text
 from qpmpc.report.columns import violations_text
 from qpmpc.report.html import html_page
 from qpmpc.report.provenance import provenance
 from qpmpc.report.table import ShownTable
-from qpmpc.solvers.settings import AdmmSettings
 
 FLIPS_SHOWN = 8
 SHOWN_CYCLES_AN_INSTRUCTION = 1.5
@@ -93,7 +93,7 @@ def write_pareto(pareto: Pareto, folder: Path) -> list[str]:
         return [f"{folder / stem}.json written; {NO_MATPLOTLIB}"]
     from qpmpc.codegen.pil.pictures import draw_pareto, draw_pil
 
-    default = AdmmSettings().iterations
+    default = MhQpSettings().admm.iterations
     shown = min(pareto.results, key=lambda result: abs(result.iterations - default))
     picture = draw_pareto(data["runs"])
     write_bytes(folder / f"{stem}.png", picture)

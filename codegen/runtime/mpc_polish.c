@@ -33,12 +33,11 @@ mpc_real mpc_polish_power_w(const mpc_state *state, mpc_real planned_w)
         const mpc_real ratio = real_max(priced, LEAST_RATIO);
         const mpc_real resistance = (ratio > REAL(1.0)) ? mpc_par.plan_resistance_discharge_ohm
                                                         : mpc_par.plan_resistance_charge_ohm;
-        const mpc_real battery_w =
-            (quarter / resistance) * (REAL(1.0) - (REAL(1.0) / (ratio * ratio)));
+        const mpc_real battery_w = (quarter / resistance)
+                                   * (REAL(1.0) - (REAL(1.0) / (ratio * ratio)));
         best_w = real_min(best_w, real_max(net_w - battery_w, mpc_par.fuel_begin_w[i]));
     }
-    const mpc_real low_w =
-        real_max(mpc_par.engine_min_w, net_w - mpc_par.battery_discharge_max_w);
+    const mpc_real low_w = real_max(mpc_par.engine_min_w, net_w - mpc_par.battery_discharge_max_w);
     const mpc_real high_w =
         real_max(real_min(mpc_par.engine_max_w, net_w + mpc_par.battery_charge_max_w), low_w);
     return (is_priced != 0) ? real_clip(best_w, low_w, high_w) : planned_w;

@@ -255,7 +255,7 @@ def _backend(of_qp: MhQpSettings, name: str) -> QpSolver:
     chosen = of_qp.solver or "osqp"
     if chosen == "osqp":
         return Osqp(of_qp.admm)
-    if of_qp.admm != AdmmSettings():
+    if of_qp.admm not in (AdmmSettings(), MhQpSettings().admm):
         section = name.replace("-", "_")
         raise InputError(
             f"{section}.admm has no effect with {section}.solver={chosen}: leave out one of them"

@@ -82,8 +82,8 @@ class MhQpSettings(BaseModel):
     horizon: HorizonSettings = HorizonSettings()
     pwa: PwaTolerances = PwaTolerances()
     qp: QpSettings = QpSettings()
-    scaling: ScalingSettings = ScalingSettings()
-    admm: AdmmSettings = AdmmSettings()
+    scaling: ScalingSettings = ScalingSettings(energy_j=80e3)
+    admm: AdmmSettings = AdmmSettings(iterations=30)
     implementation: Literal["auto", "c", "python"] = "auto"
     solver: str | None = None
     polish: bool = True
@@ -93,6 +93,8 @@ class MhQpSettings(BaseModel):
 PAPER = MhQpSettings(
     implementation="python",
     polish=False,
+    scaling=ScalingSettings(),
+    admm=AdmmSettings(),
     horizon=HorizonSettings(short_stages=20, blocks=0, block_s=20, classes=1),
 )
 

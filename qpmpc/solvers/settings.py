@@ -20,7 +20,7 @@ class AdmmSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    iterations: Annotated[int, Field(ge=1, le=100_000)] = 30
+    iterations: Annotated[int, Field(ge=1, le=100_000)] = 50
     cold_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 4000
     rho: Annotated[float, Field(ge=1e-6, le=1e6)] = 0.1  # as OSQP has it
     proximal_weight: Annotated[float, Field(ge=1e-20, le=1e3)] = 1e-6

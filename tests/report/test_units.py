@@ -17,3 +17,4 @@ def test_longest_ending_counts():
     assert unit_of("ua1_w_per_k_per_mps") == "W/(K m/s)"
     assert unit_of("heat_capacity_j_per_k") == "J/K"
     assert unit_of("span_k") == "K"
+    assert unit_of("ramp_w_per_s") == "W/s"
