@@ -92,7 +92,8 @@ static mpc_swing swing_of(const mpc_forecast *forecast, int32_t first)
         add_to(&drained, drained_w(demand_w, is_hard));
         hard += is_hard;
     }
-    const int32_t all = (end > first) ? (end - first) : 1;
+    const int32_t seconds = end - first;
+    const int32_t all = (seconds > 0) ? seconds : 1;
     const mpc_real repaid_w = mean_of(&drained, (mpc_real)((hard > 0) ? hard : all));
     mpc_swing swing = {REAL(0.0), REAL(0.0)};
     mpc_sum level = {REAL(0.0), REAL(0.0)};

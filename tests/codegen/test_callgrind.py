@@ -107,8 +107,8 @@ def test_instructions_are_a_fixed_part_a_part_a_stage_and_a_part_a_stage_and_ite
     whole = load_cycle("nycc")
     trip = Cycle.from_samples("start", whole.time_s[:9], whole.speed_mps[:9])
     horizon = ControllerSettings().mh_qp.horizon
-    builds = [(10, 2), (50, 2), (10, 7), (50, 7)]  # iterations K, blocks
-    assert horizon.blocks == 7
+    builds = [(10, 2), (50, 2), (10, 14), (50, 14)]  # iterations K, blocks
+    assert horizon.blocks == 14
     rows, instructions = [], []
     for k, blocks in builds:
         size: dict[str, object] = {
