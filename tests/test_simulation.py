@@ -168,7 +168,7 @@ def test_auto_falls_back_to_python_and_says_so(trip, caplog, chosen, named):
     assert len(caplog.records) == 1  # once per process
     summary = run.summary()
     assert summary["solver"]["implementation"] == "python"
-    assert summary["remarks"] == [remark]
+    assert remark in summary["remarks"]
     asked = simulate(trip, "mh-qp", settings={**chosen, "mh_qp.implementation": "python"})
     assert asked.remarks == ()
     np.testing.assert_array_equal(asked.trajectory.p_eng_w, run.trajectory.p_eng_w)

@@ -21,7 +21,7 @@ def test_one_run_is_reported_and_written(cli, trip, tmp_path):
     out = tmp_path / "out"
     done = cli("pil", trip, *QUICK, "--out", out)
     assert (done.code, done.err) == (0, "")
-    assert "48 steps on cortex-m7, f32, algorithm admm, 50 iterations" in done.out
+    assert "48 steps on cortex-m7, f32, algorithm admm, 30 iterations" in done.out
     for word in ("instructions/step", "estimated", "flash", "fuel", "violations", "command"):
         assert word in done.out
     assert {p.name for p in out.iterdir()} == {

@@ -50,7 +50,10 @@ def test_memory_is_within_the_budget_and_stack_is_bounded(firmware) -> None:
     precision, elf = firmware
     memory = footprint(elf)
     assert 0 < memory.stack_frames < STACK_RESERVED_BYTES // 2
-    goal_ram, goal_flash = (48 * 1024, 64 * 1024) if precision == "f32" else (96 * 1024, 128 * 1024)
+    # of a controller with 62 stages: 64 KB of RAM, twice that in double precision
+    goal_ram, goal_flash = (
+        (64 * 1024, 64 * 1024) if precision == "f32" else (128 * 1024, 128 * 1024)
+    )
     assert memory.ram_static + memory.stack_frames <= goal_ram
     assert memory.flash <= goal_flash
 

@@ -218,7 +218,8 @@ def test_comparison() -> None:
     assert open_loop["nlp_unsolved"] == 0
     assert open_loop["same_on_off_share"] > 0.9
     # what the PWA curves, the linearised alpha and a limited number of iterations cost together
-    assert open_loop["planned_fuel_percent"]["max"] < 2.0
+    # of what is left of the trip; a plan of 30 iterations is less converged than one of 50
+    assert open_loop["planned_fuel_percent"]["max"] < 4.0
     assert open_loop["soc"]["median"] < 0.01
     assert abs(closed_loop["fuel_difference_percent"]) < 1.0
     assert closed_loop["qp"]["controller"] == "mh-qp"

@@ -10,7 +10,7 @@ from qpmpc.verification.independent.equations import Equations
 from qpmpc.verification.independent.stage_program import FUEL, T_CL, expansion
 
 INTEGRAL = 0.02
-GAP_MEAN, INTEGRAL_SHARE, EXPANSION_SHARE = 0.02, 0.85, 0.005
+GAP_MEAN, INTEGRAL_SHARE, EXPANSION_SHARE = 0.04, 0.85, 0.005
 
 
 def relaxation_tight(context: Context) -> Iterator[Check]:
