@@ -25,7 +25,7 @@ CITY, CITY_S = "nycc", 150
 HIGHWAY, HIGHWAY_S = "hwfet", 120
 COLD_MARGIN_K = 0.2  # above the coolant's lower limit, so that its slack is used
 BARELY = 0.1  # solver units beyond the reachable: some 0.1 % of SOC, 0.1 K
-INSIDE = 1e-4  # solver units: room left, far above the solvers' tolerance
+INSIDE = 1e-6  # solver units: room left, a hundred times the solvers' tolerance
 THIRD = 2  # a stage under way
 
 
