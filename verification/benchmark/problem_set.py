@@ -27,7 +27,6 @@ COLD_MARGIN_K = 0.2  # above the coolant's lower limit, so that its slack is use
 BARELY = 0.1  # solver units beyond the reachable: some 0.1 % of SOC, 0.1 K
 INSIDE = 1e-6  # solver units: room left, a hundred times the solvers' tolerance
 THIRD = 2  # a stage under way
-ENERGY_J = 40e3  # unit of SOC, in which INSIDE is small enough to leave nothing but charging
 BLOCKS = 7  # of these trips of two minutes: with more, full charging leaves too little to decide
 
 
@@ -54,14 +53,12 @@ def problem_set(vehicle: Vehicle, settings: ControllerSettings | None = None) ->
     ----------
     vehicle : drives the beginning of a city cycle, and that of a highway with the coolant near
         its lower limit
-    settings : of all controllers; blocks and the unit of SOC are `BLOCKS`, `ENERGY_J`
+    settings : of all controllers; the number of blocks is `BLOCKS`
     """
     cold_degc = vehicle.thermal.t_cl_min_degc + COLD_MARGIN_K
     cold = vehicle.with_settings({"trip.t_cl_init_degc": cold_degc})
     chosen = settings or ControllerSettings()
-    chosen = chosen.with_settings(
-        {"mh_qp.horizon.blocks": BLOCKS, "mh_qp.scaling.energy_j": ENERGY_J}
-    )
+    chosen = chosen.with_settings({"mh_qp.horizon.blocks": BLOCKS})
     problems = []
     for name, trip in (
         ("city", Trip(_beginning(CITY, CITY_S), vehicle)),
