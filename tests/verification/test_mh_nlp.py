@@ -17,6 +17,9 @@ from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS, RecedingHorizon
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.errors import QpmpcError
+from qpmpc.pwa.model import PwaModel
+from qpmpc.qp.linearisation import Linearisation
+from qpmpc.qp.stage_qp import StageQp
 from qpmpc.simulation import simulate
 from qpmpc.trip import Trip
 from qpmpc.vehicle import PlantState, Vehicle, load_vehicle
@@ -24,7 +27,7 @@ from qpmpc.verification.independent.equations import Equations
 from qpmpc.verification.nonlinear.comparison import compare, compare_open_loop
 from qpmpc.verification.nonlinear.maps import RoundedTable, SmoothMaps
 from qpmpc.verification.nonlinear.mh_nlp import MhNlp
-from qpmpc.verification.nonlinear.problem import NlpVar
+from qpmpc.verification.nonlinear.problem import SOC_ROW, UNIT, NlpProblem, NlpVar
 from qpmpc.verification.nonlinear.solver import NlpPlan
 
 Floats = NDArray[np.float64]
@@ -207,6 +210,29 @@ def test_ladder() -> None:
     assert rungs == ["shifted plan"] * PLAN_VALID_STEPS + ["rule-based"] * 3
     nlp.solver.solve = solve  # type: ignore[method-assign]
     assert rung(last + 1) == ""
+
+
+def test_its_soc_limits_are_those_of_the_qp() -> None:
+    """The swing inside blocks too; where the QP has none, what a battery can hold."""
+    of_qp, trip = ControllerSettings().mh_qp, Trip(beginning("udds", 600), VEHICLE)
+    stages = trip.preview(of_qp.horizon).at(0)
+    count = len(stages.duration_s)
+    qp = StageQp(VEHICLE, PwaModel.of(VEHICLE, of_qp.pwa), count, of_qp.qp, of_qp.scaling)
+    data = qp.update(stages, 0.6, 52.0, Linearisation.constant(count, 52.0))
+    low, high = (
+        (bound / data.scaling.row).reshape(count, -1)[:, qp.rows.first("box_soc")]
+        for bound in (data.lower, data.upper)
+    )
+    program = NlpProblem(VEHICLE, count, of_qp.horizon.short_stages, of_qp.qp)
+    found = program.data(stages, 0.6, 52.0)
+    soc_low = found.row_lower.reshape(count, -1)[:, SOC_ROW] * UNIT[NlpVar.SOC]
+    soc_high = found.upper[:-1].reshape(count, -1)[:, NlpVar.SOC] * UNIT[NlpVar.SOC]
+    limited = high < 1.0
+    assert (high[limited] < VEHICLE.battery.soc_max - 0.01).any()
+    # of the reach alone the NLP has the true battery curve, the QP the fitted one
+    assert soc_low[limited] == pytest.approx(low[limited], abs=1e-4)
+    assert soc_high[limited] == pytest.approx(high[limited], abs=1e-12)
+    assert soc_high[~limited] == pytest.approx(1.0)
 
 
 def test_comparison() -> None:

@@ -15,6 +15,7 @@ from qpmpc.qp.stage_qp import T_CL_MAX_MARGIN_K, QpSettings
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.heat import air_w
 from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.vehicle.plant import EMPTY, FULL
 from qpmpc.verification.nonlinear.maps import SmoothMaps, casadi
 
 Floats = NDArray[np.float64]
@@ -228,10 +229,8 @@ class NlpProblem:
         must, can = net > battery.power_discharge_max_w, most > engine.power_min_w
         least = np.minimum(least, engine.power_max_w - POWER_GAP_W)
         most = np.maximum(most, least + POWER_GAP_W)
-        lower[:, NlpVar.SOC], upper[:, NlpVar.SOC] = 0.0, battery.soc_max / UNIT[NlpVar.SOC]
-        if not self.settings.soc_penalty_g:
-            high = self.settings.terminal_high * self.vehicle.trip.soc_init
-            upper[-1, NlpVar.SOC] = min(high, battery.soc_max) / UNIT[NlpVar.SOC]
+        soc_low, soc_high = self._soc_limits(stages, soc)
+        upper[:, NlpVar.SOC] = soc_high / UNIT[NlpVar.SOC]
         lower[:, NlpVar.T_CL], upper[:, NlpVar.T_CL] = self.vehicle.thermal.t_amb_degc, 120.0
         upper[:, NlpVar.ABOVE] = np.inf
         lower[:, NlpVar.ON] = np.where(must, SIGMA_FORCED, SIGMA_LEAST)
@@ -240,7 +239,7 @@ class NlpProblem:
         fields = stages.duration_s, net, stages.speed_mps, stages.internal_off_w
         road = np.stack([*fields, least, most, stages.rises])
         row_lower = self._row_lower.copy()
-        row_lower[:, SOC_ROW] = self._soc_low(stages, soc) / UNIT[NlpVar.SOC]
+        row_lower[:, SOC_ROW] = soc_low / UNIT[NlpVar.SOC]
         row_lower[:, T_CL_ROW] = self._floor.at(stages, soc)
         return NlpData(
             power_least_w=least,
@@ -251,16 +250,23 @@ class NlpProblem:
             row_upper=self._row_upper.ravel(),
         )
 
-    def _soc_low(self, stages: Stages, soc: float) -> Floats:
-        """Lower limits of SOC, with the QP's reserve, as far as charging throughout reaches."""
+    def _soc_limits(self, stages: Stages, soc: float) -> tuple[Floats, Floats]:
+        """Limits of SOC, with the QP's reserve and the swing inside blocks.
+
+        The lower ones are no higher than charging throughout reaches.
+        """
         battery, trip, settings = self.vehicle.battery, self.vehicle.trip, self.settings
+        maps = BatteryMaps(battery)
+        energy_j = maps.energy_j(trip.soc_init)
         reserve = settings.soc_reserve * max(trip.soc_init - battery.soc_min, 0.0)
-        low = battery.soc_min + np.where(stages.duration_s > ACCURATE_STAGE_S, reserve, 0.0)
+        low = np.maximum(battery.soc_min + stages.fall_j / energy_j, EMPTY)
+        low += np.where(stages.duration_s > ACCURATE_STAGE_S, reserve, 0.0)
+        high = np.minimum(battery.soc_max - stages.rise_j / energy_j, FULL)
         if not settings.soc_penalty_g:
             low[-1] = max(settings.terminal_low * trip.soc_init, battery.soc_min)
+            high[-1] = min(settings.terminal_high * trip.soc_init, battery.soc_max)
         most_w = self.vehicle.engine.power_max_w
         strongest = np.maximum(stages.net_w - most_w, -battery.power_charge_max_w)
-        maps = BatteryMaps(battery)
         gain = stages.duration_s * maps.internal_power_w(trip.soc_init, strongest)
-        reach = soc - np.cumsum(gain) / maps.energy_j(trip.soc_init)
-        return np.asarray(np.minimum(low, reach))
+        low = np.minimum(low, soc - np.cumsum(gain) / energy_j)
+        return low, np.maximum(high, low)
