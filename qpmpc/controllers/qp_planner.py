@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from qpmpc.controllers.monitor import Flag
 from qpmpc.controllers.receding_horizon import ON_THRESHOLD, Plan, Planner, power_while_on_w
-from qpmpc.controllers.settings import MhQpSettings, SettingsLike
+from qpmpc.controllers.settings import ControllerSettings, MhQpSettings, SettingsLike
 from qpmpc.errors import InputError
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
@@ -19,7 +19,6 @@ from qpmpc.qp.stage_qp import QpData, StageQp
 from qpmpc.solvers.base import QpSolution, QpSolver, Status, consistent, failed
 from qpmpc.solvers.names import make_solver
 from qpmpc.solvers.osqp import Osqp
-from qpmpc.solvers.settings import AdmmSettings
 from qpmpc.trip import Observation, Trip
 
 Floats = NDArray[np.float64]
@@ -255,8 +254,8 @@ def _backend(of_qp: MhQpSettings, name: str) -> QpSolver:
     chosen = of_qp.solver or "osqp"
     if chosen == "osqp":
         return Osqp(of_qp.admm)
-    if of_qp.admm not in (AdmmSettings(), MhQpSettings().admm):
-        section = name.replace("-", "_")
+    section = name.replace("-", "_")
+    if of_qp.admm != getattr(ControllerSettings(), section, MhQpSettings()).admm:
         raise InputError(
             f"{section}.admm has no effect with {section}.solver={chosen}: leave out one of them"
         )
