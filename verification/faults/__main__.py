@@ -3,7 +3,6 @@
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.progress import Progress
@@ -13,7 +12,7 @@ from qpmpc.files import write_text
 from qpmpc.pool import in_order
 from qpmpc.vehicle import vehicle_names
 from qpmpc.verification.faults.standard import standard_faults
-from qpmpc.verification.faults.table import Row, measured, summary, table
+from qpmpc.verification.faults.table import measured_job, summary, table
 
 BEGIN, END = "<!-- faults: written by python -m qpmpc.verification.faults -->", "<!-- end -->"
 
@@ -30,7 +29,7 @@ def main(arguments: list[str] | None = None) -> int:
     each = [(fault, car) for car in cars for fault in faults]
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("faults", total=len(each))
-        rows = in_order(_measured, each, lambda done, _: bar.update(task, completed=done))
+        rows = in_order(measured_job, each, lambda done, _: bar.update(task, completed=done))
     parts = []
     for car in cars:
         of_car, rows = rows[: len(faults)], rows[len(faults) :]
@@ -38,10 +37,6 @@ def main(arguments: list[str] | None = None) -> int:
     before, after = text.partition(BEGIN)[0], text.partition(END)[2]
     write_text(page, before + BEGIN + "\n\n" + "\n".join(parts) + "\n" + END + after)
     return 0
-
-
-def _measured(job: tuple[dict[str, Any], str]) -> Row:
-    return measured(*job)
 
 
 if __name__ == "__main__":

@@ -68,6 +68,11 @@ def measured(
     return _row(run.faults["each"] if run.faults else [])
 
 
+def measured_job(job: tuple[dict[str, Any], str]) -> Row:
+    """`measured` for another process, which cannot take a function from `__main__`."""
+    return measured(*job)
+
+
 def _row(effects: list[dict[str, Any]]) -> Row:
     names = {rung for each in effects for rung in each["drove"]} - {OWN}
     flags = {flag for each in effects for flag in each["flags"]}
