@@ -20,7 +20,8 @@ from qpmpc.verification.renderings.kkt import kkt_residuals, objective
 TOLERANCE = 1e-8
 NATIVE = tuple(name for name in solver_names() if name != "osqp")
 STALLING = ("highs", "proxqp")  # HiGHS cycles on some, ProxQP stops short of 1e-8 when cold
-OBJECTIVE = 2e-5  # of the cost, which is of order 1; ProxQP stops 1.5e-5 away
+OBJECTIVE = 1e-6  # solver units, in which the costliest variable costs 1 a unit
+OF_PROXQP = 2e-5  # it stops 1.5e-5 away on one of the QPs of 62 stages
 
 
 def beginning(name: str, steps: int) -> Cycle:
@@ -74,9 +75,10 @@ def test_optimum(name: str, recordings: list[Recording]) -> None:
             # z and slacks are of order 100, that of a bound on fuel which is never met 10,000:
             # 1e-8 of a dual, or HiGHS's 1e-8 in P, come out as 1e-6 .. 1e-4
             assert residuals.largest < 1e-4
+            close = OF_PROXQP if name == "proxqp" else OBJECTIVE
             assert objective(qp.data, found.primal) == pytest.approx(
                 objective(qp.data, best.primal),
-                abs=OBJECTIVE * (1.0 + abs(objective(qp.data, best.primal))),
+                abs=close * (1.0 + abs(objective(qp.data, best.primal))),
             )
     assert solved >= 4
 

@@ -22,7 +22,7 @@ from qpmpc.verification.renderings.matrices import Matrices, difference, matrice
 from qpmpc.verification.renderings.qp_cases import QpCase, random_cases, recorded_cases
 
 VEHICLE = load_vehicle()
-ROUNDING = 1e-9  # beside bounds of 2,000, of stages inside a block
+ROUNDING = 1e-12
 OPTIMUM = 1e-6
 ALL = {"cvxpy"} | ({"c"} if compiler() is not None else set())
 
