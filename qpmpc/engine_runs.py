@@ -19,9 +19,14 @@ def ended_runs_s(engine_on: NDArray[np.bool_]) -> NDArray[np.int64]:
     ----------
     engine_on : second by second, shape (steps,)
     """
-    changes = np.diff(np.asarray(engine_on, dtype=np.int64), prepend=0)
-    begins, ends = np.flatnonzero(changes > 0), np.flatnonzero(changes < 0)
+    begins, ends = _changes(engine_on)
     return np.asarray(ends - begins[: len(ends)])
+
+
+def _changes(engine_on: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Seconds in which the engine is started, and in which it is stopped."""
+    changes = np.diff(np.asarray(engine_on, dtype=np.int64), prepend=0)
+    return np.flatnonzero(changes > 0), np.flatnonzero(changes < 0)
 
 
 def run_figures(engine: Engine, engine_on: NDArray[np.bool_], distance_km: float) -> dict[str, Any]:
@@ -29,7 +34,7 @@ def run_figures(engine: Engine, engine_on: NDArray[np.bool_], distance_km: float
 
     Figures that need a run that ended, or a distance, are null without one.
     """
-    starts = int(np.count_nonzero(np.diff(np.asarray(engine_on, dtype=np.int64), prepend=0) > 0))
+    starts = len(_changes(engine_on)[0])
     runs = ended_runs_s(engine_on)
     ended = len(runs) > 0
     return {

@@ -88,7 +88,7 @@ static mpc_swing swing_of(const mpc_forecast *forecast, int32_t first)
     int32_t hard = 0;
     for (int32_t second = first; second < end; second++) {
         const mpc_real demand_w = forecast->trip.demand_w[second];
-        const int32_t is_hard = (demand_w > mpc_par.class_hard_w) ? 1 : 0;
+        const int32_t is_hard = (class_of(demand_w) == 0) ? 1 : 0;
         add_to(&drained, drained_w(demand_w, is_hard));
         hard += is_hard;
     }
@@ -99,7 +99,7 @@ static mpc_swing swing_of(const mpc_forecast *forecast, int32_t first)
     mpc_sum level = {REAL(0.0), REAL(0.0)};
     for (int32_t second = first; second < end; second++) {
         const mpc_real demand_w = forecast->trip.demand_w[second];
-        const int32_t is_hard = (demand_w > mpc_par.class_hard_w) ? 1 : 0;
+        const int32_t is_hard = (class_of(demand_w) == 0) ? 1 : 0;
         add_to(&level, -drained_w(demand_w, is_hard));
         add_to(&level, ((is_hard != 0) || (hard == 0)) ? repaid_w : REAL(0.0));
         const mpc_real now = level.sum + level.lost;

@@ -1,6 +1,6 @@
 """What a faulty signal or preview looks like to the controller."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -57,7 +57,7 @@ def altered_preview(fault: Fault, second: int, first: Preview, now: Preview) -> 
 def _missing(now: Preview) -> Preview:
     """Return an empty message: nothing is driven."""
     short, long = np.zeros_like(now.short_demand_w), np.zeros_like(now.long.duration_s)
-    return Preview(short, short.copy(), 0, Stages(*np.zeros((7, len(long)))))
+    return Preview(short, short.copy(), 0, Stages(*np.zeros((len(fields(Stages)), len(long)))))
 
 
 def _wild(now: Preview, second: int) -> Preview:

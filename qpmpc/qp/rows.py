@@ -69,7 +69,8 @@ missing_w = net_w - battery_discharge_max_w
 waste_g_per_s = where(highest_floor_degc > t_min_degc, 0.0, MOOT_G_PER_S)
 
 # SOC limits with the reserve of forecast stages, tightened by the swing inside a block, and the
-# terminal band, no higher than charging all the way leads to: a limit above that is moot
+# terminal band, no higher than charging all the way leads to: a limit above that is moot;
+# inside a block there is none, or -1 and 2
 strongest_w = max(net_w - engine_max_w, -battery_charge_max_w)
 spent_soc = running(duration_s * pwa_battery(strongest_w) / battery_energy_j)
 reach_soc = start_soc - spent_soc - reach_margin_soc
