@@ -13,7 +13,7 @@ def reproduce(
         Path, typer.Option("--out", metavar="DIR", help="Folder for the report.")
     ] = Path("results/reproduction"),
     json_file: JsonOption = None,
-    vehicle: VehicleOption = "prius-nimh",
+    vehicle: VehicleOption = "paper-nimh",
     set_: SetOption = None,
     quick: Annotated[
         bool,
@@ -30,7 +30,7 @@ def reproduce(
 
       qpmpc reproduce --out results/reproduction
 
-      qpmpc reproduce --vehicle prius-liion --set thermal.t_amb_degc=-15 --out results/cold
+      qpmpc reproduce --vehicle paper-liion --set thermal.t_amb_degc=-15 --out results/cold
     """
     from importlib.util import find_spec
 
