@@ -106,6 +106,7 @@ static void overwrite(size_t at, uint64_t *random)
 static void counts(void)
 {
     const size_t places[] = {offsetof(mpc_state, old_age),
+                             offsetof(mpc_state, old_arrival_s),
                              offsetof(mpc_state, road_age),
                              offsetof(mpc_state, phase),
                              offsetof(mpc_state, failures),

@@ -32,6 +32,9 @@ mpc_real mpc_qp_relaxation_gap(const mpc_stage *stage);
 /* mpc_polish.c: the first second at the plan's prices */
 mpc_real mpc_polish_power_w(const mpc_state *state, mpc_real planned_w);
 
+/* mpc_realise.c: from on-shares to on or off */
+mpc_command mpc_realise(const mpc_state *state);
+
 /* mpc_floor.c: coolant to be had in good time */
 void mpc_floor_find(mpc_state *state, mpc_real soc);
 

@@ -182,7 +182,9 @@ static int32_t solve(mpc_state *state)
 
 static void keep_plan(mpc_state *state)
 {
+    state->old_arrival_s = 0;
     for (int32_t k = 0; k < MPC_SHORT; k++) {
+        state->old_arrival_s += (state->stage[k].road.duration_s > REAL(0.0)) ? 1 : 0;
         state->old_on_share[k] = state->stage[k].x[MPC_VAR_ON];
         state->old_p_eng_w[k] = state->stage[k].x[MPC_VAR_P_ENG];
     }
@@ -192,18 +194,6 @@ static void keep_plan(mpc_state *state)
         state->old_p_eng_w[0] = share * mpc_polish_power_w(state, state->old_p_eng_w[0] / share);
     }
     state->old_age = 0;
-}
-
-/* On from an on-share of one half up, at the power E / on_share. */
-static mpc_command realise(const mpc_state *state)
-{
-    const mpc_real on_share = state->old_on_share[state->old_age];
-    mpc_command command = {REAL(0.0), 0};
-    if (on_share >= ON_THRESHOLD) {
-        command.engine_on = 1;
-        command.p_eng_w = state->old_p_eng_w[state->old_age] / real_min(on_share, REAL(1.0));
-    }
-    return command;
 }
 
 int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out)
@@ -237,7 +227,7 @@ int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out)
     }
     if ((state->old_age <= MPC_PLAN_VALID_STEPS) && (state->old_age < MPC_SHORT)) {
         out->rung = (is_new != 0) ? MPC_OPTIMISED : MPC_SHIFTED_PLAN;
-        command = realise(state);
+        command = mpc_realise(state);
     }
     command = mpc_safety_admissible(command, &watch->good);
     watch->command_on = command.engine_on;

@@ -78,7 +78,8 @@ class CvxpyPlanner(Planner):
     def plan(self, seen: Observation) -> Plan:
         """Solve the program of this second; without a solution there is no plan."""
         about = self._about or Linearisation.constant(self.preview.count, seen.t_cl_degc)
-        self.program.update(self.preview.at(seen.step), seen.soc, seen.t_cl_degc, about)
+        stages = self.preview.at(seen.step)
+        self.program.update(stages, seen.soc, seen.t_cl_degc, about, seen.engine_on)
         try:
             x = self.program.solve(self.solver)
             if self.solver_fails:
@@ -90,4 +91,5 @@ class CvxpyPlanner(Planner):
         layout = self.preview.settings
         self._about = Linearisation.about(x[self.preview.shift()], seen.t_cl_degc, layout)
         short = slice(layout.short_stages)
-        return Plan.of_means(x[short, Var.ON], x[short, Var.P_ENG])
+        arrival_s = stages.arrival_s(layout.short_stages)
+        return Plan.of_means(x[short, Var.ON], x[short, Var.P_ENG], arrival_s)

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.controllers.monitor import Flag
-from qpmpc.controllers.receding_horizon import ON_THRESHOLD, Plan, Planner, power_while_on_w
+from qpmpc.controllers.realise import ON_THRESHOLD
+from qpmpc.controllers.receding_horizon import Plan, Planner, power_while_on_w
 from qpmpc.controllers.settings import ControllerSettings, MhQpSettings, SettingsLike
 from qpmpc.errors import InputError
 from qpmpc.preview.stages import Stages
@@ -159,7 +160,14 @@ class QpPlanner(Planner):
             net_w = float(solved.stages.net_w[0])
             prices = self.qp.prices(solved.duals)
             power_w[0] = self._polish.power_w(prices, net_w, float(power_w[0]))
-        return Plan(on_share, power_w, True, iterations, self._relaxation_gap(solved))
+        return Plan(
+            on_share,
+            power_w,
+            True,
+            iterations,
+            self._relaxation_gap(solved),
+            arrival_s=solved.stages.arrival_s(self.of_qp.horizon.short_stages),
+        )
 
     def solve(self, seen: Observation) -> QpPlan:
         """Solve the QP of this second, from the last usable solution, shifted along.

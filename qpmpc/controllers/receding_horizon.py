@@ -17,6 +17,7 @@ from qpmpc.controllers.base import (
     base_not_called,
 )
 from qpmpc.controllers.monitor import NOTHING_WRONG, Flag
+from qpmpc.controllers.realise import ON_THRESHOLD, engine_runs
 from qpmpc.controllers.rule_based import RuleBased, last_rung
 from qpmpc.controllers.settings import SettingsLike
 from qpmpc.errors import QpmpcError
@@ -24,7 +25,6 @@ from qpmpc.preview.checked import CheckedPreview, NoPreviewError
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.plant import Command
 
-ON_THRESHOLD = 0.5  # share of a 1 s stage from which on the engine runs
 PLAN_VALID_STEPS = 10  # how many steps an old plan may drive before the rules take over
 
 
@@ -41,6 +41,7 @@ class Plan:
     flags : why not, in the terms of the ladder
     iterations : taken by the solver
     relaxation_gap : slack of the relaxation at the first second, relative; nan if there is none
+    arrival_s : second of the plan in which the trip ends; None where it ends later
     """
 
     on_share: NDArray[np.float64]
@@ -50,12 +51,15 @@ class Plan:
     relaxation_gap: float = float("nan")
     reason: str = ""
     flags: Flag = NOTHING_WRONG
+    arrival_s: int | None = None
 
     @classmethod
-    def of_means(cls, on_share: ArrayLike, p_eng_w: ArrayLike) -> "Plan":
+    def of_means(
+        cls, on_share: ArrayLike, p_eng_w: ArrayLike, arrival_s: int | None = None
+    ) -> "Plan":
         """Return the plan of mean engine powers E = sigma P_on; shape (n,) each."""
         share, mean_w = np.asarray(on_share, dtype=float), np.asarray(p_eng_w, dtype=float)
-        return cls(share, power_while_on_w(share, mean_w))
+        return cls(share, power_while_on_w(share, mean_w), arrival_s=arrival_s)
 
     @classmethod
     def none(
@@ -155,11 +159,12 @@ class RecedingHorizon(Controller):
         if plan.usable:
             self._old, self._old_step = plan, seen.step
             gap, on_share = plan.relaxation_gap, float(plan.on_share[0])
-            return Decision(_at(plan, 0), "", plan.iterations, gap, on_share, flags)
+            command = self._realised(plan, 0, seen)
+            return Decision(command, "", plan.iterations, gap, on_share, flags)
         command, rung = ruled, "rule-based"
         age = seen.step - self._old_step
         if self._old is not None and age < min(PLAN_VALID_STEPS + 1, len(self._old.on_share)):
-            command, rung = _at(self._old, age), "shifted plan"
+            command, rung = self._realised(self._old, age, seen), "shifted plan"
         return Decision(command, rung, plan.iterations, flags=flags)
 
     def _plan(self, seen: Observation) -> Plan:
@@ -172,6 +177,15 @@ class RecedingHorizon(Controller):
         if self.solver_fails and plan.usable:  # a planner that knows of no injection
             return Plan.none(iterations=plan.iterations)
         return plan
+
+    def _realised(self, plan: Plan, second: int, seen: Observation) -> Command:
+        """On or off, at the power of the next second in which the plan runs."""
+        ahead = plan.on_share[second:]
+        arrival_s = None if plan.arrival_s is None else plan.arrival_s - second
+        if not engine_runs(ahead, arrival_s, seen, self.trip.vehicle):
+            return Command(False, 0.0)
+        running = second + int(np.argmax(ahead >= ON_THRESHOLD))
+        return Command(True, float(plan.power_on_w[running]))
 
     def _checked(self, plan: Plan, second: int) -> Plan:
         """Refuse what is no plan; take one that is not finite as unusable."""
@@ -212,10 +226,3 @@ class RecedingHorizon(Controller):
         self.planner.forget()
         self._rules.depart()
         self._old = None
-
-
-def _at(plan: Plan, second: int) -> Command:
-    """On/off from the on-share: on from one half up, at the power planned for that."""
-    if plan.on_share[second] < ON_THRESHOLD:
-        return Command(False, 0.0)
-    return Command(True, float(plan.power_on_w[second]))

@@ -36,7 +36,7 @@ class HorizonSettings(BaseModel):
     class_hard_w: Annotated[float, Field(ge=-1e6, le=1e6)] = 8000.0
     class_braking_w: Annotated[float, Field(ge=-1e6, le=1e6)] = -500.0
     swing_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.85
-    rise_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
+    rise_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.75
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -41,6 +41,11 @@ class Stages:
     fall_j: NDArray[np.float64]
     rise_j: NDArray[np.float64]
 
+    def arrival_s(self, short_stages: int) -> int | None:
+        """Seconds until arrival, None where that is beyond the first `short_stages` of 1 s."""
+        count = int(np.count_nonzero(self.duration_s[:short_stages]))
+        return count if count < short_stages else None
+
 
 class Preview(NamedTuple):
     """The trip ahead as a navigation system delivers it in one second.

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from qpmpc import Trip
 from qpmpc.controllers.qp_planner import QpPlanner
-from qpmpc.controllers.receding_horizon import ON_THRESHOLD
+from qpmpc.controllers.realise import ON_THRESHOLD
 from qpmpc.controllers.settings import PAPER, BaselineMpcSettings, ControllerSettings
 from qpmpc.cycles import load_cycle
 from qpmpc.preview import HorizonSettings, StageBuilder, Trace

@@ -262,8 +262,8 @@ MUTATIONS = [
         "l=data.lower, u=data.upper, ", "", (limits_kept, relaxation_tight, warm_start_shifted),
     ),
     Mutation(
-        "engine on whatever the share", qpmpc.controllers.receding_horizon, "_at",
-        "if plan.on_share[second] < ON_THRESHOLD", "if plan.on_share[second] < 0.0",
+        "engine on whatever the share", qpmpc.controllers.receding_horizon, "engine_runs",
+        "bool(on_share[0] >= ON_THRESHOLD)", "bool(on_share[0] >= 0.0)",
         (limits_kept, bound_below_everything, relaxation_tight),
         also=Replacement(
             qpmpc.controllers.qp_planner, "power_while_on_w",

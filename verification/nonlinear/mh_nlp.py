@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from qpmpc.controllers.receding_horizon import ON_THRESHOLD, Plan, Planner
+from qpmpc.controllers.realise import ON_THRESHOLD
+from qpmpc.controllers.receding_horizon import Plan, Planner
 from qpmpc.controllers.settings import SettingsLike
 from qpmpc.trip import Observation, Trip
 from qpmpc.verification.nonlinear.problem import NlpProblem, NlpVar
@@ -52,7 +53,8 @@ class MhNlp(Planner):
         powers_w = np.zeros_like(on_share)
         for stage in np.flatnonzero(on_share >= ON_THRESHOLD).tolist():
             powers_w[stage] = solved.power_on_w(stage)
-        return Plan(on_share, powers_w, True, solved.iterations)
+        arrival_s = solved.stages.arrival_s(self._short)
+        return Plan(on_share, powers_w, True, solved.iterations, arrival_s=arrival_s)
 
     def forget(self) -> None:
         """Forget preview and last solution, as after a restart of the controller under way."""

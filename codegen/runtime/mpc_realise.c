@@ -1,0 +1,69 @@
+/* From planned on-shares to on or off: a start or a stop only if the plan keeps to it.
+ *
+ * On where the share of the coming second is one half at least, but the engine is started only if
+ * the mean over its shortest run is one half at least and arrival is no nearer, or if the battery
+ * alone cannot drive; it is stopped only if the mean over its shortest rest is one half at most.
+ *
+ * The same in Python, with the reasons: qpmpc/controllers/realise.py.
+ */
+#include "mpc_constants.h"
+#include "mpc_model.h"
+#include "mpc_parts.h"
+#include "mpc_real.h"
+
+/* Mean on-share over that many seconds of the plan from `first` on, or over all that are left. */
+static mpc_real mean_share(const mpc_state *state, int32_t first, int32_t seconds)
+{
+    mpc_real sum = REAL(0.0);
+    int32_t count = 0;
+    for (int32_t k = first; k < MPC_SHORT; k++) {
+        if (k < (first + seconds)) {
+            sum += real_clip(state->old_on_share[k], REAL(0.0), REAL(1.0));
+            count++;
+        }
+    }
+    return sum / (mpc_real)count;
+}
+
+/* Whether the plan starts the engine, or stops it, for long enough. */
+static int32_t keeps(const mpc_state *state, int32_t first, int32_t wish)
+{
+    const int32_t bound_s = (wish != 0) ? mpc_par.min_on_s : mpc_par.min_off_s;
+    const int32_t left_s = state->old_arrival_s - first;
+    const int32_t is_near = ((state->old_arrival_s < MPC_SHORT) && (left_s < bound_s)) ? 1 : 0;
+    int32_t seconds = (left_s < bound_s) ? left_s : bound_s;
+    seconds = (seconds < 1) ? 1 : seconds;
+    const mpc_real mean = mean_share(state, first, seconds);
+    int32_t result = 0;
+    if (wish != 0) {
+        result = ((mean >= ON_THRESHOLD) && (is_near == 0)) ? 1 : 0;
+    } else {
+        result = (mean <= ON_THRESHOLD) ? 1 : 0;
+    }
+    return result;
+}
+
+/* Command of the second of the plan that has come, at the power E / on_share of the next second in
+ * which the plan runs. */
+mpc_command mpc_realise(const mpc_state *state)
+{
+    const mpc_measured *const seen = &state->watch.good;
+    const int32_t first = state->old_age;
+    const mpc_real lacking_w =
+        (seen->demand_w + mpc_par.aux_power_w) - mpc_par.battery_discharge_max_w;
+    int32_t on = (state->old_on_share[first] >= ON_THRESHOLD) ? 1 : 0;
+    const int32_t must = ((on != 0) && (lacking_w > REAL(0.0))) ? 1 : 0;
+    if ((on != seen->engine_on) && (must == 0) && (keeps(state, first, on) == 0)) {
+        on = seen->engine_on;
+    }
+    mpc_command command = {REAL(0.0), on};
+    int32_t is_found = 0;
+    for (int32_t k = first; k < MPC_SHORT; k++) {
+        const mpc_real share = state->old_on_share[k];
+        if ((on != 0) && (is_found == 0) && (share >= ON_THRESHOLD)) {
+            command.p_eng_w = state->old_p_eng_w[k] / real_min(share, REAL(1.0));
+            is_found = 1;
+        }
+    }
+    return command;
+}
