@@ -2,7 +2,8 @@
 
 Run it with ``python -m qpmpc.verification.checks.epa``. EPA's figures are unadjusted miles per
 gallon from its test-car list for the 2016 Prius; the plant was fitted to them with few free
-numbers, so this shows that the structure is consistent; it is not an independent validation.
+numbers, so this shows that the structure is consistent; it is not an independent validation. The
+fit was made with an engine that starts at no cost, `paper-nimh`; the default car is shown beside it.
 """
 
 import sys
@@ -15,11 +16,12 @@ from qpmpc.controllers.balance import rule_based
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.report.table import ShownTable
 from qpmpc.trip import Trip
-from qpmpc.vehicle import load_vehicle
+from qpmpc.vehicle import DEFAULT_VEHICLE, load_vehicle
 
 M_PER_MILE = 1609.344
 L_PER_GALLON = 3.785411784
 TOLERANCE = 0.03  # of the model's own reference figures
+AS_FITTED = "paper-nimh"
 
 _COLD_ROAD = {
     # S EPA test-car list, 2016 Prius, cold-CO test
@@ -73,9 +75,9 @@ CASES = (
 )
 
 
-def model_mpg(case: EpaCase) -> float:
-    """Unadjusted, SOC-balanced miles per gallon of the default car in one case."""
-    vehicle = load_vehicle().with_settings(case.vehicle)
+def model_mpg(case: EpaCase, vehicle_name: str = AS_FITTED) -> float:
+    """Unadjusted, SOC-balanced miles per gallon of a car in one case."""
+    vehicle = load_vehicle(vehicle_name).with_settings(case.vehicle)
     settings = ControllerSettings().with_settings(case.rules)
     trip = Trip(case.cycle, vehicle)
     run = drive(trip, rule_based(trip, settings))
@@ -86,20 +88,23 @@ def model_mpg(case: EpaCase) -> float:
 def main() -> int:
     """Print the table; the exit code is 1 if a figure is off its reference by more than 3 %."""
     table = ShownTable(title="Rule-based, unadjusted mpg")
-    for column in ("case", "EPA", "this model", "reference", "off reference", "off EPA"):
+    as_fitted = ("as fitted", "off reference", "off EPA")
+    for column in ("case", "EPA", *as_fitted, "default", "off EPA"):
         table.add_column(column, justify="left" if column == "case" else "right")
     worst = 0.0
     for case in CASES:
         mpg = model_mpg(case)
         off = mpg / case.reference_mpg - 1.0
         worst = max(worst, abs(off))
+        default_mpg = model_mpg(case, DEFAULT_VEHICLE)
         table.add_row(
             case.name,
             f"{case.epa_mpg:.1f}",
             f"{mpg:.1f}",
-            f"{case.reference_mpg:.1f}",
             f"{off:+.1%}",
             f"{mpg / case.epa_mpg - 1.0:+.1%}",
+            f"{default_mpg:.1f}",
+            f"{default_mpg / case.epa_mpg - 1.0:+.1%}",
         )
     Console().print(table)
     return 0 if worst <= TOLERANCE else 1

@@ -1,0 +1,66 @@
+"""From on-shares to on or off: what a start or a stop binds is what the plan mostly wants."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from qpmpc.controllers.realise import engine_runs
+from qpmpc.simulation import simulate
+from qpmpc.trip import Observation
+from qpmpc.vehicle import load_vehicle
+
+CAR = load_vehicle()  # a start binds 4 s, a stop 2 s
+FREE = load_vehicle("paper-nimh")
+OFF = Observation(0, 0.6, 60.0, False, 3e3, 10.0)
+ON = OFF._replace(engine_on=True)
+SHARES = st.lists(st.floats(-0.1, 1.1), min_size=1, max_size=20).map(np.array)
+
+
+@pytest.mark.parametrize(
+    ("on_share", "arrival_s", "seen", "runs"),
+    [
+        ([1, 0, 0, 0, 0], None, OFF, False),  # a second's run is not worth four
+        ([1, 1, 0, 0, 0], None, OFF, True),
+        ([0.4, 1, 1, 1, 1], None, OFF, False),  # not before the plan starts it
+        ([0.6, 0.6, 0.4, 0.4, 0], None, OFF, True),
+        ([1, 1, 1, 0, 0], 3, OFF, False),  # it could not run for 4 s any more
+        ([1, 1, 1, 1, 0], 4, OFF, True),
+        ([1, 1, 1], None, OFF, True),  # a plan of 3 s only: nothing is known of the fourth
+        ([1, 0, 0, 0, 0], None, OFF._replace(demand_w=30e3), True),  # beyond the battery
+        ([1, 0, 0], 1, OFF._replace(demand_w=30e3), True),
+        ([0, 1, 1], None, ON, False),  # as long off as on in the 2 s that a stop binds
+        ([0.2, 0.9, 1], None, ON, True),
+        ([0, 0, 1], None, ON, False),
+        ([1, 0, 0], None, ON, True),
+        ([0, 1], 1, ON, False),  # what is after arrival does not count
+    ],
+)
+def test_a_change_needs_most_of_the_seconds_that_it_binds(on_share, arrival_s, seen, runs):
+    assert engine_runs(np.array(on_share, dtype=float), arrival_s, seen, CAR) is runs
+
+
+@given(SHARES, st.none() | st.integers(1, 19), st.booleans())
+def test_an_engine_without_limits_follows_the_share(on_share, arrival_s, engine_on):
+    seen = OFF._replace(engine_on=engine_on)
+    assert engine_runs(on_share, arrival_s, seen, FREE) == (on_share[0] >= 0.5)
+
+
+@given(SHARES, st.none() | st.integers(1, 19), st.booleans())
+def test_no_change_without_the_share_of_the_second(on_share, arrival_s, engine_on):
+    """Looking ahead may keep the engine as it is, but never changes it before the plan does."""
+    seen = OFF._replace(engine_on=engine_on)
+    wish = on_share[0] >= 0.5
+    assert engine_runs(on_share, arrival_s, seen, CAR) in {engine_on, wish}
+
+
+@pytest.mark.parametrize("cycle", ["nycc", "random-3-187s"])
+@pytest.mark.parametrize("car", ["prius-nimh", "prius-liion"])
+def test_no_run_is_cut_short_not_even_by_arrival(cycle, car):
+    """Where no limit asks for it; arrival would cut off a run that began in the last 3 s."""
+    run = simulate(cycle, "mh-qp", car)
+    on = run.trajectory.engine_on.astype(int)
+    changes = np.diff(on, prepend=0, append=0)
+    lengths = np.flatnonzero(changes < 0) - np.flatnonzero(changes > 0)
+    assert len(lengths) > 0
+    assert lengths.min() >= load_vehicle(car).engine.min_on_s
