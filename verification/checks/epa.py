@@ -3,7 +3,7 @@
 Run it with ``python -m qpmpc.verification.checks.epa``. EPA's figures are unadjusted miles per
 gallon from its test-car list for the 2016 Prius; the plant was fitted to them with few free
 numbers, so this shows that the structure is consistent; it is not an independent validation. The
-fit was made with an engine that starts at no cost, `paper-nimh`; the default car is shown beside it.
+fit was made with an engine that starts at no cost, `paper-nimh`; the default car stands beside.
 """
 
 import sys
