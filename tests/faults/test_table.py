@@ -14,9 +14,6 @@ from qpmpc.verification.faults.table import TARGET_PERCENT, measured, table
 PAGE = (Path(__file__).parents[2] / "docs" / "faults.md").read_text("utf-8")
 FAULTS = {as_faults([{**fault, "at_s": 0}])[0].what: fault for fault in standard_faults()}
 
-# the page covers the cars whose engine has limits; those of the paper are for comparison with it
-CARS = ("prius-nimh", "prius-liion")
-
 
 def rows(car: str) -> dict[str, list[str]]:
     """Cells of a car's table by fault."""
@@ -33,12 +30,12 @@ def numbers(cell: str) -> list[float]:
     return [float(text) for text in re.findall(r"[+-]?\d+\.\d+", cell)]
 
 
-@pytest.mark.parametrize("car", CARS)
+@pytest.mark.parametrize("car", command.CARS)
 def test_every_standard_fault_has_a_row(car):
     assert list(rows(car)) == list(FAULTS)
 
 
-@pytest.mark.parametrize("car", CARS)
+@pytest.mark.parametrize("car", command.CARS)
 def test_bold_figures_and_counts_follow_from_the_rows(car):
     for column, (seconds, target) in zip((0, 3), TARGET_PERCENT.items(), strict=True):
         kept = 0
