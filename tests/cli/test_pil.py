@@ -50,7 +50,10 @@ def test_json_on_stdout_is_nothing_but_json(cli, trip, strict_json):
 @needs_tools
 def test_pareto_has_every_iteration_count_beside_the_optimum(cli, trip, tmp_path, strict_json):
     pytest.importorskip("numba", reason="not installed: numba, for dynamic programming")
-    named = ("--precision", "f32", "--algorithm", "admm")
+    # The engine of the paper. Where starts take fuel mh-qp ends this trip with 0.1 % more SOC than
+    # dp, made at a better efficiency than eta_eq, at which it is priced: that is 0.1 % of the fuel
+    # below dp, whose own grid error is 0.002 % there too.
+    named = ("--precision", "f32", "--algorithm", "admm", "--vehicle", "paper-nimh")
     done = cli("pil", trip, *QUICK, *named, "--pareto", "--out", tmp_path, "--json", "-")
     assert done.code == 0
     data = strict_json(done.out)

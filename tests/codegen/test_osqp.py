@@ -159,11 +159,14 @@ def test_generated_project_builds_by_its_makefile(tmp_path, files) -> None:
     assert HostLibrary(tmp_path / "libmpc.so", numbers(), "f64").state_bytes > 0
 
 
-def test_pattern_has_the_entries_that_the_adapter_counts() -> None:
-    values = numbers()
+# Where starts take fuel, five entries more: three in their row, its bound, heat in the coolant's
+# row. The first stage has none before it: SOC, coolant and, for starts, the on-share.
+@pytest.mark.parametrize(("car", "more", "first"), [("paper-nimh", 0, 2), ("prius-nimh", 5, 3)])
+def test_pattern_has_the_entries_that_the_adapter_counts(car, more, first) -> None:
+    values = numbers(vehicle=load_vehicle(car))
     sizes = values.sizes
     pieces = sizes.fuel_pieces + sizes.battery_pieces
-    assert matrix_pattern(values).nnz == sizes.stages * (3 * pieces + 21) - 2
+    assert matrix_pattern(values).nnz == sizes.stages * (3 * pieces + 21 + more) - first
 
 
 def test_numbers_too_small_for_what_osqp_generates_are_refused() -> None:

@@ -41,13 +41,14 @@ def test_mh_qp_saves_against_the_rules(runs, cycle, saving):
     "starts",
     [{"engine.start_fuel_g": 0.3}, {"engine.start_fuel_g": 0.2, "engine.start_energy_j": 4e3}],
 )
-def test_starts_that_cost_something_are_planned(runs, starts):
+def test_starts_that_cost_something_are_planned(starts):
     """Half the starts for less fuel than the plan that knows of none; alike in Python and C."""
-    blind = runs["nycc", "mh-qp"]
-    seeing = simulate("nycc", "mh-qp", settings=starts)
+    blind = simulate("nycc", "mh-qp", "paper-nimh")
+    seeing = simulate("nycc", "mh-qp", "paper-nimh", settings=starts)
     engine, trip = seeing.vehicle.engine, seeing.vehicle.trip
     price_g = engine.start_fuel_g + engine.start_energy_j / (trip.eta_eq * engine.lhv_j_per_g)
-    same = simulate("nycc", "mh-qp", settings={**starts, "mh_qp.implementation": "python"})
+    in_python = {**starts, "mh_qp.implementation": "python"}
+    same = simulate("nycc", "mh-qp", "paper-nimh", settings=in_python)
     assert 0 < seeing.trajectory.started.sum() <= 0.6 * blind.trajectory.started.sum()
     blindly_g = blind.fuel_soc_balanced_g + price_g * blind.trajectory.started.sum()
     assert seeing.fuel_soc_balanced_g < 0.98 * blindly_g
@@ -71,9 +72,13 @@ def test_longer_cycles_stay_within_limits(cycle):
 
 # Once a kelvin or two over 90 degC there: the plan took the radiator for as open as it liked. The
 # small battery is at its lower limit before the motorway ends, and the engine has to give the rest:
-# half a kelvin too much, which dynamic programming avoids. With SOC limited inside blocks too it is
-# nil, but a trip that begins at a low SOC then takes 2.4 % more fuel (train-095).
-@pytest.mark.parametrize(("vehicle", "excess_k"), [("prius-nimh", 0.0), ("prius-liion", 0.5)])
+# 0.65 K too much, which dynamic programming avoids. The price of a start makes 0.18 K of that: with
+# the engine of the paper it is 0.47 K, with a ramp and shortest runs and rests besides 0.50 K. With
+# SOC limited inside blocks too it is nil, but a trip that begins at a low SOC then takes 2.4 % more
+# fuel (train-095).
+@pytest.mark.parametrize(
+    ("vehicle", "excess_k"), [("prius-nimh", 0.0), ("prius-liion", 0.66), ("paper-liion", 0.5)]
+)
 def test_hot_coolant_in_mild_weather_keeps_its_limit(vehicle, excess_k):
     car = load_vehicle(vehicle).with_settings({"thermal.t_amb_degc": 10.0})
     summary = simulate(load_cycle("wltc-3b"), "mh-qp", car).summary()

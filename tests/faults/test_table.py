@@ -7,7 +7,6 @@ import pytest
 
 from qpmpc.codegen.c_compiler import compiler
 from qpmpc.faults.models import as_faults
-from qpmpc.vehicle import vehicle_names
 from qpmpc.verification.faults import __main__ as command
 from qpmpc.verification.faults.standard import standard_faults
 from qpmpc.verification.faults.table import TARGET_PERCENT, measured, table
@@ -31,12 +30,12 @@ def numbers(cell: str) -> list[float]:
     return [float(text) for text in re.findall(r"[+-]?\d+\.\d+", cell)]
 
 
-@pytest.mark.parametrize("car", vehicle_names())
+@pytest.mark.parametrize("car", command.CARS)
 def test_every_standard_fault_has_a_row(car):
     assert list(rows(car)) == list(FAULTS)
 
 
-@pytest.mark.parametrize("car", vehicle_names())
+@pytest.mark.parametrize("car", command.CARS)
 def test_bold_figures_and_counts_follow_from_the_rows(car):
     for column, (seconds, target) in zip((0, 3), TARGET_PERCENT.items(), strict=True):
         kept = 0

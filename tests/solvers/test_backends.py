@@ -104,11 +104,14 @@ def test_unique_solution_is_found(name: str, recordings: list[Recording]) -> Non
 def test_osqp_converges_to_the_same_optimum(recordings: list[Recording]) -> None:
     for recording in recordings:
         reference = make_solver("piqp", 1e-11)
-        solver = Osqp(AdmmSettings(cold_iterations=40_000))
-        for backend in (reference, solver):
+        # from nothing: 40,000 iterations leave the highway's departure at 1.5e-3, these at 3e-4
+        departing = Osqp(AdmmSettings(cold_iterations=80_000))
+        driving = Osqp(AdmmSettings(cold_iterations=40_000))
+        for backend in (reference, departing, driving):
             backend.setup(recording.structure, recording.solves[0].data)
         for qp in chosen(recording):
             best = objective(qp.data, reference.solve(qp.data, None, None).primal)
+            solver = departing if qp is recording.solves[0] else driving
             found = solver.solve(qp.data, qp.primal, qp.dual, cold=True)
             residuals = kkt_residuals(recording.structure, qp.data, found.primal, found.dual)
             assert residuals.largest < 1e-3  # first order on a nearly linear problem: slow to end

@@ -48,6 +48,21 @@ def test_the_li_ion_car_is_the_default_one_with_another_battery():
     assert load_vehicle("prius-liion").model_dump() == expected
 
 
+@pytest.mark.parametrize("pack", ["nimh", "liion"])
+def test_the_cars_of_the_paper_are_the_others_with_a_free_engine(pack):
+    expected = load_vehicle(f"prius-{pack}").model_dump()
+    found = load_vehicle(f"paper-{pack}")
+    expected |= {"name": f"paper-{pack}", "description": found.description}
+    expected["engine"] |= {
+        "start_fuel_g": 0.0,
+        "start_energy_j": 0.0,
+        "min_on_s": 0,
+        "min_off_s": 0,
+        "ramp_w_per_s": 1e6,
+    }
+    assert found.model_dump() == expected
+
+
 @pytest.mark.parametrize("base", vehicle_names())
 @given(changes=differences())
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -94,7 +109,7 @@ def test_an_array_alone_must_fit_those_of_the_base(write):
 @pytest.mark.parametrize(
     ("base", "words"),
     [
-        ('"prius"', ["mine.toml: base: unknown vehicle 'prius'", "prius-nimh, prius-liion"]),
+        ('"prius"', ["mine.toml: base: unknown vehicle 'prius'", "prius-nimh, paper-liion"]),
         ('""', ["mine.toml: base: unknown vehicle ''"]),
         ('"none.toml"', ["mine.toml: base: vehicle file", "none.toml: no such file"]),
         ('"a\\u0000.toml"', ["mine.toml: base: vehicle file", "null"]),

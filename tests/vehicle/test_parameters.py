@@ -20,7 +20,7 @@ def _text() -> str:
 
 
 def test_shipped_vehicles_load_and_the_default_comes_first():
-    assert vehicle_names() == ("prius-nimh", "prius-liion")
+    assert vehicle_names() == ("prius-nimh", "paper-liion", "paper-nimh", "prius-liion")
     for name in vehicle_names():
         assert load_vehicle(name).name == name
 
@@ -39,9 +39,9 @@ def test_a_vehicle_file_loads_like_the_shipped_one(tmp_path):
         ("mass_kg = 1530.9", "weight_kg = 1530.9", "weight_kg"),
         ("soc_min = 0.4 ", "soc_min = 0.9 ", "soc_min"),
         ("start_energy_j = 0.0", "start_energy_j = 13501.0", "engine.start_energy_j"),
-        ("min_on_s = 0 ", "min_on_s = 4.5 ", "engine.min_on_s"),
-        ("min_off_s = 0 ", "min_off_s = 601 ", "engine.min_off_s"),
-        ("ramp_w_per_s = 1.0e6", "ramp_w_per_s = 0.0", "engine.ramp_w_per_s"),
+        ("min_on_s = 4 ", "min_on_s = 4.5 ", "engine.min_on_s"),
+        ("min_off_s = 2 ", "min_off_s = 601 ", "engine.min_off_s"),
+        ("ramp_w_per_s = 11833.0", "ramp_w_per_s = 0.0", "engine.ramp_w_per_s"),
         ("soc_init = 0.6", "soc_init = 0.95", "soc_init"),
         ("power_discharge_max_w = 27000.0", "power_discharge_max_w = 60000.0", "power_discharge"),
         ("torque_speed_rpm = [1000,", "torque_speed_rpm = [9000,", "torque_speed_rpm"),

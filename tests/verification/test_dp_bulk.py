@@ -18,7 +18,7 @@ from qpmpc.vehicle import load_vehicle
 from qpmpc.verification.dynamic_programming import DpSettings, cache, quick_error, solve_dp, sweep
 from qpmpc.verification.dynamic_programming.threads import default_threads
 
-VEHICLE = load_vehicle()
+VEHICLE = load_vehicle("paper-nimh")  # its engine gives all it has at once, even uphill
 TYPED = {"soc_step": 0.004, "t_cl_step_k": 1.0, "power_step_w": 1000.0, "refinement": 4}
 
 
@@ -119,21 +119,21 @@ def test_segments_fit_into_the_memory_or_are_the_least(steps: int, value_bytes: 
 
 def test_a_run_that_is_no_optimum_is_not_comparable() -> None:
     """72 kW, 1 kW more than the engine has: no limit is left, but SOC falls by 0.1 %."""
-    run = simulate(climb(0.06), "dp", settings={"dp.grid": "quick"})
+    run = simulate(climb(0.06), "dp", VEHICLE, settings={"dp.grid": "quick"})
     assert not run.excess.any.any()
     assert abs(run.soc_correction_g) < 0.03 * run.fuel_g
     (reason,) = run.not_comparable
     assert "found nothing that keeps all limits and the final SOC" in reason
     said = [line for line in run.summary()["remarks"] if "dynamic programming" in line]
     assert said == [f"dp on climb: not comparable: {reason}"]
-    assert simulate(climb(0.05), "dp", settings={"dp.grid": "quick"}).comparable
+    assert simulate(climb(0.05), "dp", VEHICLE, settings={"dp.grid": "quick"}).comparable
 
 
 def test_a_tube_that_does_not_settle_is_remarked() -> None:
     narrow = {"dp.grid": "quick", "dp.tube_soc": 1e-3, "dp.tube_t_cl_k": 0.1}
-    run = simulate("nycc", "dp", settings=narrow)
+    run = simulate("nycc", "dp", VEHICLE, settings=narrow)
     assert [line for line in run.remarks if "the edge of its tube after 6 tubes" in line]
-    assert not simulate(urban(), "dp", settings={"dp.grid": "quick"}).remarks
+    assert not simulate(urban(), "dp", VEHICLE, settings={"dp.grid": "quick"}).remarks
 
 
 # the error of the quick grid
@@ -154,7 +154,7 @@ def test_quick_error(
 ) -> None:
     file = tmp_path / "error.json"
     cycles = [trips("hill.csv", 12), trips("we|ird.csv", 30)]
-    assert quick_error.main([*cycles, "--vehicle", "prius-nimh", "--json", str(file)]) == 0
+    assert quick_error.main([*cycles, "--vehicle", "paper-nimh", "--json", str(file)]) == 0
     hill, steep = json.loads(file.read_text())["rows"]
     # seconds are few cells long: the error is larger than on a trip, and of either sign
     assert abs(hill["difference_percent"]) < 5.0
@@ -163,7 +163,7 @@ def test_quick_error(
     assert not steep["quick"]["admissible"]
     assert steep["difference_percent"] is None
     lines = capsys.readouterr().out.splitlines()
-    assert lines[3].startswith(r"| we\|ird | 33 | prius-nimh |")
+    assert lines[3].startswith(r"| we\|ird | 33 | paper-nimh |")
     assert "not admissible" in lines[3]
     assert lines[-1].startswith("1 of 2 compared")
 

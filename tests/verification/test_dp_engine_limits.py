@@ -15,7 +15,7 @@ from qpmpc.verification.dynamic_programming import DpSettings, DpSolution, cache
 from qpmpc.verification.dynamic_programming.engine_states import NEVER, EngineStates
 from qpmpc.verification.dynamic_programming.power_limits import power_limits
 
-VEHICLE = load_vehicle()
+VEHICLE = load_vehicle("paper-nimh")  # without limits: each test sets its own
 COARSE = DpSettings(soc_step=0.004, t_cl_step_k=1.0, power_step_w=1000.0, refinement=2, threads=1)
 # for a drive of seconds, where a cell is a large part of the energy
 FINE = DpSettings(power_step_w=250.0, refinement=16, tube_soc=0.02, tube_t_cl_k=1.0, threads=1)

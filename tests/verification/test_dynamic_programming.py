@@ -28,7 +28,9 @@ from qpmpc.verification.dynamic_programming.kernels import next_soc as compiled_
 from qpmpc.verification.dynamic_programming.kernels import next_t_cl as compiled_next_t_cl
 from qpmpc.verification.dynamic_programming.problem import build_problem
 
-VEHICLE = load_vehicle()
+# The engine of the paper: closed forms, searches and rules know of no start, run or ramp.
+# `test_dp_engine_limits` has those.
+VEHICLE = load_vehicle("paper-nimh")
 PLANT = Plant(VEHICLE)
 NYCC = build_problem(load_cycle("nycc"), VEHICLE)
 MAPS, CONSTANTS = NYCC.maps, NYCC.constants

@@ -21,7 +21,7 @@ from qpmpc.verification.renderings.generated_qp import READ
 from qpmpc.verification.renderings.matrices import Matrices, difference, matrices_of
 from qpmpc.verification.renderings.qp_cases import QpCase, random_cases, recorded_cases
 
-VEHICLE = load_vehicle()
+VEHICLE = load_vehicle("paper-nimh")  # `test_other_settings` has engines whose starts cost
 ROUNDING = 1e-12
 OPTIMUM = 1e-6
 ALL = {"cvxpy"} | ({"c"} if compiler() is not None else set())

@@ -23,6 +23,7 @@ CYCLE = "nycc"
 SAME, TABLES = 1e-9, 1e-3
 STAGES_TRIED, THERMOSTAT_K = 2000, 1e-4
 NOISE_G = 0.02  # a controller of finite accuracy may be off by this between two cases
+FREE_RAMP_W_PER_S = 1e6  # the largest that a vehicle may have
 NO_HEAT: dict[str, object] = {
     "cold_engine.k": 0.0,
     "thermal.cabin_heat_w": 0.0,
@@ -147,14 +148,16 @@ def constant_demand(context: Context) -> Iterator[Check]:
 
 def engine_covers_demand(context: Context) -> Iterator[Check]:
     """The engine gives exactly the demand: SOC stays, fuel is the curve's."""
-    from qpmpc.vehicle import Command, Plant
+    from qpmpc.vehicle import Command, Plant, PlantState
 
     vehicle, equations = context.vehicle, Equations(context.vehicle)
     plant = Plant(vehicle)
-    aux, state = vehicle.battery.aux_power_w, Plant(vehicle).initial_state()
-    alpha = float(equations.alpha(state.t_cl_degc))
+    aux, trip = vehicle.battery.aux_power_w, vehicle.trip
+    alpha = float(equations.alpha(trip.t_cl_init_degc))
     worst = 0.0
     for power in np.arange(1000.0, 70000.0, 2300.0):
+        # it has been running at this power: no start takes fuel, and no ramp is in the way
+        state = PlantState(trip.soc_init, trip.t_cl_init_degc, True, p_eng_w=float(power))
         after, flows = plant.step(state, Command(True, power), power - aux, 15.0)
         expected = float(equations.fuel_g_per_s(power)[0]) * alpha * plant.step_s
         worst = max(worst, abs(after.soc - state.soc), abs(flows.fuel_g / expected - 1.0))
@@ -172,8 +175,11 @@ def dimensions(context: Context) -> Iterator[Check]:
     """Units and sizes: double the heating value, or the whole car."""
     vehicle = context.vehicle
     base = _fuel_g(vehicle, ControllerSettings())
-    lhv = 2.0 * vehicle.engine.lhv_j_per_kg
-    half = _fuel_g(vehicle.with_settings({"engine.lhv_j_per_kg": lhv}), ControllerSettings())
+    richer = {  # a start takes the same heat
+        "engine.lhv_j_per_kg": 2.0 * vehicle.engine.lhv_j_per_kg,
+        "engine.start_fuel_g": 0.5 * vehicle.engine.start_fuel_g,
+    }
+    half = _fuel_g(vehicle.with_settings(richer), ControllerSettings())
     yield Check(
         "Double heating value",
         "Fuel of twice the heating value is burnt in exactly half the mass.",
@@ -217,6 +223,8 @@ def _twice(vehicle: Vehicle) -> tuple[Vehicle, ControllerSettings]:
             value = getattr(getattr(vehicle, section), key)
             is_table = isinstance(value, tuple)
             changes[f"{section}.{key}"] = tuple(2.0 * v for v in value) if is_table else 2.0 * value
+    if vehicle.engine.ramp_w_per_s == FREE_RAMP_W_PER_S:  # none for twice the engine either
+        del changes["engine.ramp_w_per_s"]
     for key in ("resistance_discharge_ohm", "resistance_charge_ohm"):
         changes[f"battery.{key}"] = tuple(0.5 * r for r in getattr(vehicle.battery, key))
     rules = ControllerSettings().rule_based

@@ -22,7 +22,7 @@ CHECKS = (
 
 
 def with_starts(context: Context) -> Iterator[Check]:
-    """Checks of the free engine, again on NYCC with 0.2 g and 4 kJ a start."""
+    """Checks again, on NYCC with 4 kJ of cranking a start besides its fuel."""
     starting = Context(True, load_vehicle().with_settings(STARTS))
     starting.settings = context.settings
     for check in CHECKS:

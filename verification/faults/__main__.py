@@ -10,10 +10,10 @@ from rich.progress import Progress
 from qpmpc.errors import InputError
 from qpmpc.files import write_text
 from qpmpc.pool import in_order
-from qpmpc.vehicle import vehicle_names
 from qpmpc.verification.faults.standard import standard_faults
 from qpmpc.verification.faults.table import measured_job, summary, table
 
+CARS = ("prius-nimh", "prius-liion")  # without those of the paper, which no one builds
 BEGIN, END = "<!-- faults: written by python -m qpmpc.verification.faults -->", "<!-- end -->"
 
 
@@ -25,13 +25,13 @@ def main(arguments: list[str] | None = None) -> int:
     text = page.read_text("utf-8")
     if not 0 <= text.find(BEGIN) < text.find(END):
         raise InputError(f"{page}: no marks {BEGIN} and {END}")
-    faults, cars = standard_faults(), vehicle_names()
-    each = [(fault, car) for car in cars for fault in faults]
+    faults = standard_faults()
+    each = [(fault, car) for car in CARS for fault in faults]
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("faults", total=len(each))
         rows = in_order(measured_job, each, lambda done, _: bar.update(task, completed=done))
     parts = []
-    for car in cars:
+    for car in CARS:
         of_car, rows = rows[: len(faults)], rows[len(faults) :]
         parts.append(f"### {car}\n\n{car}: {summary(of_car)}\n\n{table(of_car)}")
     before, after = text.partition(BEGIN)[0], text.partition(END)[2]
