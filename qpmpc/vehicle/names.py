@@ -10,7 +10,7 @@ _FOLDER = resources.files("qpmpc.vehicle") / "data"
 
 def _shipped() -> dict[str, Shipped]:
     names = sorted(file.name.removesuffix(".toml") for file in _FOLDER.iterdir())
-    names.sort(key=lambda name: name != DEFAULT_VEHICLE)
+    names.sort(key=lambda name: (name != DEFAULT_VEHICLE, name.startswith("paper-")))
     return {name: Shipped(f"data/{name}.toml") for name in names}
 
 

@@ -20,7 +20,7 @@ def _text() -> str:
 
 
 def test_shipped_vehicles_load_and_the_default_comes_first():
-    assert vehicle_names() == ("prius-nimh", "paper-liion", "paper-nimh", "prius-liion")
+    assert vehicle_names() == ("prius-nimh", "prius-liion", "paper-liion", "paper-nimh")
     for name in vehicle_names():
         assert load_vehicle(name).name == name
 
