@@ -14,6 +14,8 @@ from qpmpc.codegen.values import values_of
 from qpmpc.controllers.base import Controller, Decision, Progress, Receive
 from qpmpc.controllers.monitor import Flag
 from qpmpc.controllers.settings import ControllerSettings, MhQpSettings
+from qpmpc.pwa.model import PwaModel
+from qpmpc.qp.expectation import expectation
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.plant import Command
 
@@ -94,7 +96,8 @@ class GeneratedController(Controller):
         self.library = self._normal = build_host_library(values, precision)
         self.remarks += filter(None, [self.library.remark])
         self.fill_s = self.call_s = 0.0
-        self._receive = trip.preview(self.of_qp.horizon).receive
+        self._preview = trip.preview(self.of_qp.horizon)
+        self._receive = self._preview.receive
         self.inputs = InputBuilder(self._receive)
         self._state = ctypes.create_string_buffer(self.library.state_bytes)
         self._in, self._out = self.library.input_type(), self.library.output_type()
@@ -103,10 +106,15 @@ class GeneratedController(Controller):
     def depart(self, progress: Progress | None = None) -> None:
         """Set a defined state; prepare the first plan, unless the settings disable that."""
         self.forget()
+        self.expects = None
         if self.of_qp.prepared:
             self.inputs.fill(self.trip.start, self._in)
-            while self.library.depart(self._state, ctypes.byref(self._in)) > 0:
+            while (left := self.library.depart(self._state, ctypes.byref(self._in))) > 0:
                 pass
+            if left == 0:
+                layout, stages = self.of_qp.horizon, self._preview.at(self.trip.start.step)
+                model, x = PwaModel.of(self.trip.vehicle, self.of_qp.pwa), self.plan()[0]
+                self.expects = expectation(self.trip, layout, model, stages, x)
 
     def step(self, seen: Observation) -> Decision:
         """Run one step in C."""

@@ -91,6 +91,7 @@ def _drive(
             *_fallbacks(controller.name, record.fallback),
         ),
         reservations=tuple(controller.reservations),
+        expects=controller.expects,
         vehicle=trip.vehicle,
         distance_km=trip.cycle.distance_m / 1e3,
         trajectory=record,

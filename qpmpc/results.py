@@ -12,6 +12,7 @@ from qpmpc.controllers.base import Decision
 from qpmpc.controllers.monitor import Flag
 from qpmpc.engine_runs import run_figures
 from qpmpc.limits import Excess, excess_of, sentence
+from qpmpc.qp.expectation import Expectation
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.parameters import STEP_S, Vehicle
 from qpmpc.vehicle.plant import PlantState, StepFlows
@@ -21,6 +22,7 @@ Floats = NDArray[np.float64]
 REFERENCE, OPTIMUM = "rule-based", "dp"  # controllers that the others are compared with
 COMPARABLE_SHARE = 0.03  # largest SOC correction, as a share of fuel, of a comparable run
 MOSTLY = 0.5  # share of the time
+OFF_EXPECTED_PERCENT = 1.0  # from which on a run's fuel is in doubt, see docs/qp.md
 
 
 @dataclass
@@ -90,6 +92,7 @@ class Run:
     trajectory : second by second
     faults : what injected faults did, as plain data; see `qpmpc.faults.effects`
     reservations : why its controller says that its fuel cannot be compared
+    expects : what its controller expected at departure
     """
 
     cycle: str
@@ -102,6 +105,7 @@ class Run:
     trajectory: Trajectory
     faults: dict[str, Any] | None = None
     reservations: tuple[str, ...] = ()
+    expects: Expectation | None = None
 
     @property
     def fuel_g(self) -> float:
@@ -111,15 +115,45 @@ class Run:
     @property
     def soc_correction_g(self) -> float:
         """(SOC_init - SOC_end) E_bat / (eta_eq LHV): fuel that the battery gave or took."""
-        soc, trip, engine = self.trajectory.soc, self.vehicle.trip, self.vehicle.engine
+        return self._correction_g(float(self.trajectory.soc[-1]))
+
+    def _correction_g(self, soc_end: float) -> float:
+        trip, engine = self.vehicle.trip, self.vehicle.engine
         energy_j = BatteryMaps(self.vehicle.battery).energy_j(trip.soc_init)
-        used_j = float(soc[0] - soc[-1]) * energy_j
+        used_j = (float(self.trajectory.soc[0]) - soc_end) * energy_j
         return used_j / (trip.eta_eq * engine.lhv_j_per_kg * 1e-3)
 
     @property
     def fuel_soc_balanced_g(self) -> float:
         """Fuel as if the run had ended at its initial SOC."""
         return self.fuel_g + self.soc_correction_g
+
+    @property
+    def fuel_expected_g(self) -> float | None:
+        """SOC-balanced fuel that the plan at departure expected; None without such a plan."""
+        if self.expects is None:
+            return None
+        return self.expects.fuel_g + self._correction_g(self.expects.soc_end)
+
+    @property
+    def fuel_off_expected_percent(self) -> float | None:
+        """How far SOC-balanced fuel is above, or below, what was expected at departure."""
+        expected_g = self.fuel_expected_g
+        if not expected_g:
+            return None
+        return 100.0 * (self.fuel_soc_balanced_g / expected_g - 1.0)
+
+    @property
+    def doubt(self) -> str:
+        """Why its fuel may be far from the optimum, in a line; empty if nothing tells so."""
+        off = self.fuel_off_expected_percent
+        if off is None or abs(off) <= OFF_EXPECTED_PERCENT:
+            return ""
+        return (
+            f"{self.controller} on {self.cycle}: fuel is {abs(off):.2g} % "
+            f"{'above' if off > 0.0 else 'below'} what the plan at departure expected: the "
+            "forecast was wrong or the plan a poor one, and the fuel may be far from the optimum"
+        )
 
     @cached_property
     def excess(self) -> Excess:
@@ -200,10 +234,13 @@ class Run:
             "remarks": [
                 *self.remarks,
                 *(f"{self.controller} on {self.cycle}: not comparable: {why}" for why in reasons),
+                *filter(None, [self.doubt]),
             ],
             "flags": flag_seconds(tr.flags),
             **run_figures(self.vehicle.engine, tr.engine_on, self.distance_km),
             "friction_brake_j": float(tr.p_friction_w.sum()) * STEP_S,
+            "fuel_expected_g": self.fuel_expected_g,
+            "fuel_off_expected_percent": self.fuel_off_expected_percent,
             **({} if self.faults is None else {"faults": self.faults}),
         }
 

@@ -15,6 +15,7 @@ from qpmpc.controllers.safety import SafetyLayer
 from qpmpc.controllers.settings import SettingsLike, as_settings
 from qpmpc.errors import InputError, QpmpcError
 from qpmpc.preview.stages import Preview
+from qpmpc.qp.expectation import Expectation
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.plant import Command
 
@@ -65,6 +66,7 @@ class Driver:
 
     name: str = ""
     solver_name: str = ""
+    expects: Expectation | None = None  # of the trip, once departed, where it plans that far
     solver_fails: bool = False  # by injection: what the solver returns this second is unusable
     Settings: ClassVar[type[BaseModel] | None] = None
     _has_name: ClassVar[bool] = False  # its own, or from a class above it

@@ -13,6 +13,7 @@ from qpmpc.controllers.settings import ControllerSettings, MhQpSettings, Setting
 from qpmpc.errors import InputError
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
+from qpmpc.qp.expectation import expectation
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.polish import Polish
 from qpmpc.qp.rows import Var
@@ -134,6 +135,7 @@ class QpPlanner(Planner):
     def depart(self, seen: Observation) -> None:
         """Solve the QP of departure from cold, with several linearisations, to convergence."""
         self.forget()
+        self.expects = None
         if not self.of_qp.prepared:
             return
         stages, t_cl_degc = self.preview.at(seen.step), seen.t_cl_degc
@@ -144,6 +146,7 @@ class QpPlanner(Planner):
                 return
             about, start = self._about(plan.x, t_cl_degc), (plan.x, plan.duals)
         self.last, self._last_step, self._solves = plan, seen.step, WARM_UP_STEPS
+        self.expects = expectation(self.trip, self.of_qp.horizon, self.model, stages, plan.x)
 
     def plan(self, seen: Observation) -> Plan:
         """Spend one step's iterations on the QP of this second."""

@@ -147,6 +147,7 @@ class RecedingHorizon(Controller):
         self._old, self._has_reason = None, False
         with suppress(NoPreviewError):  # then it starts from cold, under way
             self.planner.depart(self.trip.start)
+        self.expects = self.planner.expects
 
     def step(self, seen: Observation) -> Decision:
         """Run one step: the plan, else the shifted last plan, else the rules."""

@@ -57,6 +57,8 @@ FIGURES: dict[str, type] = {
     "engine_runs_below_min_on_s": int,
     "fuel_starts_g": float,
     "friction_brake_j": float,
+    "fuel_expected_g": float,
+    "fuel_off_expected_percent": float,
     "faults_effect": str,
 }
 PROVENANCE: dict[str, type] = {

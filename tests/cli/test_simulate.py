@@ -12,6 +12,7 @@ KEYS = {
     "relaxation_gap", "sigma_integral_share", "step_time_ms", "solver", "remarks",
     "engine_starts_per_km", "engine_on_s", "engine_runs_below_3s_share",
     "engine_runs_below_min_on_s", "fuel_starts_g", "friction_brake_j",
+    "fuel_expected_g", "fuel_off_expected_percent",
 }  # fmt: skip
 INNER_KEYS = {
     "violations": {"soc", "t_cl_degc", "power_w"},
@@ -37,7 +38,8 @@ def test_json_has_the_keys_of_the_contract(cli, strict_json, trip, controller):
     assert run["cycle"] == "short"
     assert run["solver"]["name"] == ALGORITHMS[controller]
     assert run["solver"]["implementation"] == ("c" if controller == "mh-qp" else "python")
-    assert run["remarks"] == []
+    # a drive this short is not always what the plan at departure expected
+    assert [line for line in run["remarks"] if "expected" not in line] == []
 
 
 def test_with_json_on_stdout_the_table_is_on_stderr(cli, trip):

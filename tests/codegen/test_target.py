@@ -50,8 +50,9 @@ def test_memory_is_within_the_budget_and_stack_is_bounded(firmware) -> None:
     precision, elf = firmware
     memory = footprint(elf)
     assert 0 < memory.stack_frames < STACK_RESERVED_BYTES // 2
-    # of a controller with 62 stages: 64 KB of RAM, twice that in double precision
-    goal_ram_kb, goal_flash_kb = (64, 64) if precision == "f32" else (128, 128)
+    # of a controller with 62 stages and starts of the engine: 80 KB of RAM, twice that in double
+    # precision; without the variable of starts it is 64 and 128
+    goal_ram_kb, goal_flash_kb = (80, 64) if precision == "f32" else (160, 128)
     assert memory.ram_static + memory.stack_frames <= goal_ram_kb * 1024
     assert memory.flash <= goal_flash_kb * 1024
 
