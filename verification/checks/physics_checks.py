@@ -175,7 +175,7 @@ def dimensions(context: Context) -> Iterator[Check]:
     """Units and sizes: double the heating value, or the whole car."""
     vehicle = context.vehicle
     base = _fuel_g(vehicle, ControllerSettings())
-    richer = {  # a start takes the same heat
+    richer: dict[str, object] = {  # a start takes the same heat
         "engine.lhv_j_per_kg": 2.0 * vehicle.engine.lhv_j_per_kg,
         "engine.start_fuel_g": 0.5 * vehicle.engine.start_fuel_g,
     }
