@@ -16,13 +16,13 @@ import pytest
 
 import qpmpc.codegen.values
 import qpmpc.controllers.qp_planner
-import qpmpc.controllers.receding_horizon
 import qpmpc.preview.forecast
 import qpmpc.preview.stages
 import qpmpc.pwa.model
 import qpmpc.qp.stage_qp
 import qpmpc.vehicle.heat
 from qpmpc.codegen.c_compiler import compiler
+from qpmpc.controllers.receding_horizon import RecedingHorizon
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.preview.forecast import Trace
@@ -265,8 +265,8 @@ MUTATIONS = [
         "l=data.lower, u=data.upper, ", "", (limits_kept, relaxation_tight, warm_start_shifted),
     ),
     Mutation(
-        "engine on whatever the share", qpmpc.controllers.receding_horizon, "engine_runs",
-        "bool(on_share[0] >= ON_THRESHOLD)", "bool(on_share[0] >= 0.0)",
+        "engine on whatever the share", RecedingHorizon, "_realised",
+        "if not engine_runs(ahead, arrival_s, seen, self.trip.vehicle):", "if False:",
         (limits_kept, bound_below_everything, relaxation_tight),
         also=Replacement(
             qpmpc.controllers.qp_planner, "power_while_on_w",

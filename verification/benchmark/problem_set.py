@@ -25,7 +25,7 @@ CITY, CITY_S = "nycc", 150
 HIGHWAY, HIGHWAY_S = "hwfet", 120
 COLD_MARGIN_K = 0.2  # above the coolant's lower limit, so that its slack is used
 BARELY = 0.1  # solver units beyond the reachable: some 0.1 % of SOC, 0.1 K
-INSIDE = 0.01  # room left, 0.01 % of SOC; with less PIQP or ProxQP may call it infeasible
+INSIDE = 0.03  # room left, 0.03 % of SOC; with less PIQP or ProxQP may call it infeasible
 THIRD = 2  # a stage under way
 BLOCKS = 7  # of these trips of two minutes: with more, full charging leaves too little to decide
 

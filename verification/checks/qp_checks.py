@@ -30,8 +30,10 @@ REGULARISED = 5e-5  # relative fuel that the QP's quadratic regularisation may c
 
 
 def samples(context: Context, loop: Loop) -> list[int]:
-    """Steps whose QPs are checked."""
-    return loop.sample(QUICK_SAMPLES if context.quick else FULL_SAMPLES)[1:]
+    """Steps whose QPs are checked; in one of them at least the engine runs already."""
+    spread = loop.sample(QUICK_SAMPLES if context.quick else FULL_SAMPLES)[1:]
+    running = np.flatnonzero(loop.run.trajectory.engine_on[:-1])[:1] + 1
+    return sorted({*spread, *running.tolist()})
 
 
 def stages_agree(context: Context) -> Iterator[Check]:
