@@ -44,11 +44,11 @@ def test_the_other_car_on_a_mild_day(cli, tmp_path, monkeypatch, strict_json):
     out, data = tmp_path / "out", tmp_path / "data.json"
     done = cli(
         *("reproduce", "--quick", "--out", out, "--json", data),
-        *("--vehicle", "prius-liion", "--set", "thermal.t_amb_degc=10"),
+        *("--vehicle", "paper-liion", "--set", "thermal.t_amb_degc=10"),
     )
     assert done.code == 0, done.err
     found = strict_json(data.read_text("utf-8"))
-    assert found["vehicle"] == "prius-liion"
+    assert found["vehicle"] == "paper-liion"
     assert found["t_amb_degc"] == 10.0
     assert found == json.loads((out / "reproduction.json").read_text("utf-8"))
     for check in found["checks"]:

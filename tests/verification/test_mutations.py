@@ -279,8 +279,8 @@ MUTATIONS = [
 @pytest.fixture(autouse=True)
 def fewer(monkeypatch):
     """A part of what the quick run tries is enough here, and takes a fifth of the time."""
-    monkeypatch.setattr(rendering_checks, "QUICK_EVERY", 150)
-    monkeypatch.setattr(rendering_checks, "QUICK_RANDOM", 4)
+    monkeypatch.setattr(rendering_checks, "QUICK_EVERY", 250)
+    monkeypatch.setattr(rendering_checks, "QUICK_RANDOM", 3)
     monkeypatch.setattr(backend_checks, "QUICK_BACKENDS", ("clarabel", "daqp", "qoco"))
     monkeypatch.setattr(nlp_checks, "EVERY", 40)
 

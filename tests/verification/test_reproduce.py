@@ -44,7 +44,7 @@ def jobs() -> Counter:
 @pytest.fixture(scope="module")
 def study(jobs: Counter, tmp_path_factory: pytest.TempPathFactory) -> Study:
     # a cold day, so that overrides are seen to arrive
-    vehicle = load_vehicle().with_settings({"thermal.t_amb_degc": -15.0})
+    vehicle = load_vehicle("paper-nimh").with_settings({"thermal.t_amb_degc": -15.0})
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("QPMPC_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
         return run_study(vehicle, ControllerSettings(), Extent.quick(), jobs)
