@@ -62,8 +62,9 @@ class Runs(Sequence[Run]):
 
     def remarks(self) -> list[str]:
         """Return the notes that a reader of the table needs, one line each."""
-        said = dict.fromkeys(remark for run in self._runs for remark in run.remarks)
-        return [*notes(self.rows()), *said]
+        rows = self.rows()
+        said = dict.fromkeys(remark for row in rows for remark in row["remarks"])
+        return [*notes(rows), *said]
 
     def to_html(self, file: str | os.PathLike[str]) -> Path:
         """Write the report: one page with table, pictures and settings that needs no other file.

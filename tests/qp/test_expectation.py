@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from qpmpc.comparison import compare
 from qpmpc.controllers.mh_qp import MhQp
 from qpmpc.qp.expectation import expectation
 from qpmpc.qp.rows import Var
@@ -27,6 +28,7 @@ def test_a_mean_of_the_demand_promises_too_much_and_the_run_says_so():
     (said,) = [line for line in run.summary()["remarks"] if "expected" in line]
     assert said == run.doubt
     assert "above what the plan at departure expected" in said
+    assert said in compare("nycc", ["mh-qp-paper"], "paper-nimh").remarks()
 
 
 def test_a_trip_other_than_the_forecast_says_so():
