@@ -6,6 +6,7 @@ from typing import Any
 from qpmpc.codegen.host_library import HostLibrary
 from qpmpc.errors import InputError
 from qpmpc.preview.forecast import Trace
+from qpmpc.preview.place import forecast_seconds
 from qpmpc.trip import Observation
 
 
@@ -57,6 +58,7 @@ class ForecastInputs:
         self._same = forecast is None
         self._seen = Road(truth, library.real)
         self._trip = Road(forecast or truth, library.real)
+        self._forecast_second = forecast_seconds(truth, forecast or truth).tolist()
         self._memory = ctypes.create_string_buffer(functions.mpc_forecast_bytes())
         self._from_forecast = functions.mpc_in_from_forecast
         self._from_preview = functions.mpc_in_from_preview
@@ -72,4 +74,6 @@ class ForecastInputs:
             self._from_forecast(self._memory, seen.step, ctypes.byref(into))
         else:
             ahead = ctypes.byref(self._seen.after(seen.step))
-            self._from_preview(self._memory, seen.step, ahead, ctypes.byref(into))
+            end = min(seen.step + len(into.short_demand_w), self._seen.steps)
+            beyond = self._forecast_second[end]
+            self._from_preview(self._memory, seen.step, beyond, ahead, ctypes.byref(into))

@@ -97,7 +97,8 @@ static void attack_memory(source *from)
         const int32_t now = in.second;
         fill(&trip.forecast, sizeof trip.forecast, from);
         require(mpc_in_from_forecast(&trip.forecast, trip.place, &in) == -1
-                    && mpc_in_from_preview(&trip.forecast, trip.place, &trip.road, &in) == -1,
+                    && mpc_in_from_preview(&trip.forecast, trip.place, trip.place, &trip.road, &in)
+                           == -1,
                 "a preview from bad memory", &state, &out);
         in.second = now;
         (void)mpc_forecast_start(&trip.forecast, &trip.road);

@@ -219,7 +219,8 @@ static void fill_long(const mpc_forecast *forecast, int32_t is_arriving, mpc_in 
 }
 
 /* Apart from mpc_in_from_preview, which nothing in this file may call alone (MISRA C:2012 8.7). */
-static int32_t fill(mpc_forecast *forecast, int32_t step, const mpc_road *seen, mpc_in *in)
+static int32_t fill(mpc_forecast *forecast, int32_t step, int32_t beyond, const mpc_road *seen,
+                    mpc_in *in)
 {
     const int32_t is_ahead = ((step >= 0) && (seen->steps > 0)) ? 1 : 0;
     const int32_t is_under_way = is_ahead & is_started(forecast);
@@ -228,8 +229,7 @@ static int32_t fill(mpc_forecast *forecast, int32_t step, const mpc_road *seen, 
     in->short_count = (is_arriving != 0) ? ahead : MPC_SHORT;
     in->second = step;
     if (is_arriving == 0) {
-        const int32_t now = (step < MPC_LONGEST_TRIP_S) ? step : MPC_LONGEST_TRIP_S;
-        leave_from(forecast, now + MPC_SHORT);
+        leave_from(forecast, beyond);
     }
     fill_short(seen, in);
     fill_long(forecast, is_arriving, in);
@@ -248,12 +248,13 @@ int32_t mpc_in_from_forecast(mpc_forecast *forecast, int32_t step, mpc_in *in)
         seen.demand_w = &trip->demand_w[from];
         seen.speed_mps = &trip->speed_mps[from];
     }
-    return fill(forecast, step, &seen, in);
+    return fill(forecast, step, from + MPC_SHORT, &seen, in);
 }
 
-int32_t mpc_in_from_preview(mpc_forecast *forecast, int32_t step, const mpc_road *seen, mpc_in *in)
+int32_t mpc_in_from_preview(mpc_forecast *forecast, int32_t step, int32_t beyond,
+                            const mpc_road *seen, mpc_in *in)
 {
-    return fill(forecast, step, seen, in);
+    return fill(forecast, step, beyond, seen, in);
 }
 
 int32_t mpc_forecast_bytes(void) { return (int32_t)sizeof(mpc_forecast); }

@@ -81,8 +81,14 @@ int32_t mpc_in_from_forecast(mpc_forecast *forecast, int32_t step, mpc_in *in);
 /* The same with a better short preview: `seen`, whose first second is the coming one. At most
  * MPC_SHORT values of its arrays are read. seen->steps above MPC_SHORT means that arrival is beyond
  * it; up to MPC_SHORT, that the trip ends there, whatever the length of the forecast.
+ *
+ * `beyond` is the first second of the forecast that `seen` does not show: that of the place on the
+ * route where the car will be MPC_SHORT seconds from now, which does not wait for the clock. Let it
+ * rise by no more than 2 a second, and by 1 while the car stands: a faster one looks like another
+ * route, one that does not move like an old message. By the clock it is step + MPC_SHORT.
  */
-int32_t mpc_in_from_preview(mpc_forecast *forecast, int32_t step, const mpc_road *seen, mpc_in *in);
+int32_t mpc_in_from_preview(mpc_forecast *forecast, int32_t step, int32_t beyond,
+                            const mpc_road *seen, mpc_in *in);
 
 /* Power demand at the car's battery and engine, from speed, acceleration and grade (rise over run):
  *

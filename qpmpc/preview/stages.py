@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from qpmpc.preview.forecast import Trace, internal_off_w
 from qpmpc.preview.horizon import HorizonSettings
+from qpmpc.preview.place import forecast_seconds
 from qpmpc.preview.swing import NO_LIMIT_J, swings
 from qpmpc.vehicle.parameters import Vehicle
 
@@ -46,6 +47,10 @@ class Stages:
         count = int(np.count_nonzero(self.duration_s[:short_stages]))
         return count if count < short_stages else None
 
+    def seconds_w(self, short_stages: int) -> NDArray[np.float64]:
+        """P0 of the seconds that come, up to `short_stages` or arrival."""
+        return self.net_w[: int(np.count_nonzero(self.duration_s[:short_stages]))]
+
 
 class Preview(NamedTuple):
     """The trip ahead as a navigation system delivers it in one second.
@@ -73,10 +78,10 @@ class StageBuilder:
     or that the short horizon covers, has duration 0. So a long stage keeps its slot, and primal
     and dual variables can be carried from step to step by identity.
 
-    The forecast is read at the time since departure and may be wrong about the trip's length. A
-    trip that outlasts it goes on with the short horizon alone, and the terminal band then applies
-    to its end; a trip that ends before it is planned to its end as soon as the short horizon
-    reaches the arrival, and the rest of the forecast is masked.
+    The forecast is read at the car's place on its route (`qpmpc.preview.place`) and may be wrong
+    about the trip's length. A trip that outlasts it goes on with the short horizon alone, and the
+    terminal band then applies to its end; a trip that ends before it is planned to its end as soon
+    as the short horizon reaches the arrival, and the rest of the forecast is masked.
 
     Parameters
     ----------
@@ -95,6 +100,7 @@ class StageBuilder:
         padding = np.zeros(settings.short_stages)
         self._demand_w = np.concatenate([truth.demand_w, padding])
         self._speed_mps = np.concatenate([truth.speed_mps, padding])
+        self._forecast_second = forecast_seconds(truth, forecast)
         demand_class = _demand_class(forecast.demand_w, settings)
         self._cumulative = _cumulative(forecast, vehicle, demand_class, settings.classes)
         self._cumulative_rises = _cumulative_rises(demand_class, settings.classes)
@@ -145,10 +151,14 @@ class StageBuilder:
 
     def _long_start(self, step: int) -> NDArray[np.intp]:
         """First second of each block beyond the short horizon; its end where there is none."""
-        n_short = self.settings.short_stages
-        arriving = step + n_short >= self.steps
-        start = np.clip(step + n_short, self._block_start, self._block_end)
-        return self._block_end if arriving else start
+        if step + self.settings.short_stages >= self.steps:  # arriving
+            return self._block_end
+        start: NDArray[np.intp] = np.clip(self.beyond(step), self._block_start, self._block_end)
+        return start
+
+    def beyond(self, step: int) -> int:
+        """Return the first second of the forecast beyond the short horizon of a time step."""
+        return int(self._forecast_second[min(step + self.settings.short_stages, self.steps)])
 
     def _long_fields(self, start: NDArray[np.intp]) -> NDArray[np.float64]:
         """Fields of the long stages, from those seconds on; shape (FIELDS, blocks * classes)."""

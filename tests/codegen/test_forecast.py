@@ -188,7 +188,7 @@ def test_after_a_refusal_the_short_horizon_drives_alone(library) -> None:
     assert functions.mpc_in_from_forecast(memory, 0, ctypes.byref(into)) == -1
     assert into.short_count == 0
     ahead = ctypes.byref(good._trip.after(5))
-    assert functions.mpc_in_from_preview(memory, 5, ahead, ctypes.byref(into)) == 0
+    assert functions.mpc_in_from_preview(memory, 5, 25, ahead, ctypes.byref(into)) == 0
     assert into.short_count == SETTINGS.mh_qp.horizon.short_stages
     assert not any(into.long_duration_s)
 

@@ -55,7 +55,8 @@ int main(void)
         for (int32_t second = 0; second < 8; second++) {
             const mpc_road seen = road(below(60));
             const int32_t step = below(100) - 5;
-            const int32_t bad = below(2) ? mpc_in_from_preview(&forecast, step, &seen, &in)
+            const int32_t beyond = below(150) - 5;
+            const int32_t bad = below(2) ? mpc_in_from_preview(&forecast, step, beyond, &seen, &in)
                                          : mpc_in_from_forecast(&forecast, step, &in);
             let_go(seen);
             mpc_init(&state);

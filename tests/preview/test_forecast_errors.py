@@ -133,7 +133,7 @@ def test_stages_of_a_trip_that_is_not_as_long_as_forecast(
     seen = min(short, 150 - step)
     assert len(stages.duration_s) == builder.count
     assert stages.duration_s[:short].sum() == seen
-    beyond = 0 if step + short >= 150 else max(known - step - short, 0)
+    beyond = 0 if step + short >= 150 else known - builder.beyond(step)
     assert stages.duration_s[short:].sum() == beyond
     assert np.isfinite(stages.net_w).all()
 
