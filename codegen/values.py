@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpmpc.codegen.forecast_values import fixed_block_s, forecast_scalars
-from qpmpc.controllers import monitor, qp_planner, realise, safety
+from qpmpc.controllers import monitor, qp_planner, ramp, realise, safety
 from qpmpc.controllers.qp_planner import DEPARTURE_LINEARISATIONS, WARM_UP_STEPS
 from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS
 from qpmpc.controllers.rule_based import last_rung
@@ -33,6 +33,7 @@ EQUALITY_WIDTH = 1e-4  # solver units
 CONSTANTS: dict[str, dict[str, float]] = {
     module.__name__: {name: getattr(module, name) for name in names.split()}
     for module, names in (
+        (ramp, "SOC_KEPT"),
         (realise, "ON_THRESHOLD"),
         (qp_planner, "FAILURES_FORGIVEN LEAST_SIZE_W"),
         (linearisation, "COLDEST_DEGC HOTTEST_DEGC DEPARTURE_FUEL_G_PER_S DEPARTURE_P_ENG_W"),

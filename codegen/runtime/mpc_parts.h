@@ -32,6 +32,9 @@ mpc_real mpc_qp_relaxation_gap(const mpc_stage *stage);
 /* mpc_polish.c: the first second at the plan's prices */
 mpc_real mpc_polish_power_w(const mpc_state *state, mpc_real planned_w);
 
+/* mpc_ramp.c: what the ramp asks of the coming second */
+mpc_real mpc_ramp_least_w(const mpc_state *state);
+
 /* mpc_realise.c: from on-shares to on or off */
 mpc_command mpc_realise(const mpc_state *state);
 

@@ -49,10 +49,15 @@ mpc_command mpc_realise(const mpc_state *state)
 {
     const mpc_measured *const seen = &state->watch.good;
     const int32_t first = state->old_age;
+    const mpc_real least_w = (first == 0) ? state->old_least_w : REAL(0.0);
     const mpc_real lacking_w = (seen->demand_w + mpc_par.aux_power_w)
                                - mpc_par.battery_discharge_max_w;
     int32_t on = (state->old_on_share[first] >= ON_THRESHOLD) ? 1 : 0;
-    const int32_t must = ((on != 0) && (lacking_w > REAL(0.0))) ? 1 : 0;
+    int32_t must = ((on != 0) && (lacking_w > REAL(0.0))) ? 1 : 0;
+    if (least_w > REAL(0.0)) {
+        on = 1;
+        must = 1;
+    }
     if ((on != seen->engine_on) && (must == 0) && (keeps(state, first, on) == 0)) {
         on = seen->engine_on;
     }
@@ -65,5 +70,6 @@ mpc_command mpc_realise(const mpc_state *state)
             is_found = 1;
         }
     }
+    command.p_eng_w = (on != 0) ? real_max(command.p_eng_w, least_w) : REAL(0.0);
     return command;
 }

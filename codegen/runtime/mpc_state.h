@@ -85,6 +85,7 @@ typedef struct {
     mpc_real cost;                    /* of the solver, in units per g */
     mpc_real old_on_share[MPC_SHORT]; /* last usable plan */
     mpc_real old_p_eng_w[MPC_SHORT];
+    mpc_real old_least_w;  /* of its first second, see mpc_ramp.c */
     int32_t old_age;       /* steps since then; MPC_NO_PLAN if there is none */
     int32_t old_arrival_s; /* seconds of it before arrival; MPC_SHORT if that is beyond */
     int32_t road_age;      /* seconds since the last good preview; MPC_NO_PLAN if there is none */

@@ -193,6 +193,7 @@ static void keep_plan(mpc_state *state)
         const mpc_real share = real_min(on_share, REAL(1.0));
         state->old_p_eng_w[0] = share * mpc_polish_power_w(state, state->old_p_eng_w[0] / share);
     }
+    state->old_least_w = mpc_ramp_least_w(state);
     state->old_age = 0;
 }
 

@@ -4,6 +4,7 @@ from typing import Any
 
 import cvxpy
 
+from qpmpc.controllers.ramp import RampFloor
 from qpmpc.controllers.receding_horizon import Plan, Planner
 from qpmpc.controllers.settings import SettingsLike
 from qpmpc.errors import InputError, QpmpcError
@@ -56,6 +57,7 @@ class CvxpyPlanner(Planner):
         if not self.program.problem.is_dcp():
             raise QpmpcError(f"{self.name}: what terms adds is not convex by cvxpy's rules")
         self._about: Linearisation | None = None
+        self._ramp = RampFloor(vehicle)
 
     def terms(self, program: CvxpyTwin) -> tuple[Any, list[Any]]:
         """Return additions to the program: a cost in grams, and constraints.
@@ -92,4 +94,5 @@ class CvxpyPlanner(Planner):
         self._about = Linearisation.about(x[self.preview.shift()], seen.t_cl_degc, layout)
         short = slice(layout.short_stages)
         arrival_s = stages.arrival_s(layout.short_stages)
-        return Plan.of_means(x[short, Var.ON], x[short, Var.P_ENG], arrival_s)
+        least_w = self._ramp.least_w(stages.seconds_w(layout.short_stages), seen.soc)
+        return Plan.of_means(x[short, Var.ON], x[short, Var.P_ENG], arrival_s, least_w)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.controllers.monitor import Flag
+from qpmpc.controllers.ramp import RampFloor
 from qpmpc.controllers.realise import ON_THRESHOLD
 from qpmpc.controllers.receding_horizon import Plan, Planner, power_while_on_w
 from qpmpc.controllers.settings import ControllerSettings, MhQpSettings, SettingsLike
@@ -120,6 +121,7 @@ class QpPlanner(Planner):
             vehicle, self.model, self.preview.count, self.of_qp.qp, self.of_qp.scaling
         )
         self._polish = Polish(vehicle, self.model)
+        self._ramp = RampFloor(vehicle)
         self.last: QpPlan | None = None
         self._last_step = 0
         self._solves = 0
@@ -170,6 +172,7 @@ class QpPlanner(Planner):
             iterations,
             self._relaxation_gap(solved),
             arrival_s=solved.stages.arrival_s(self.of_qp.horizon.short_stages),
+            least_w=self._ramp.least_w(solved.stages.seconds_w(short.stop), seen.soc),
         )
 
     def solve(self, seen: Observation) -> QpPlan:

@@ -16,16 +16,20 @@ ON_THRESHOLD = 0.5  # share of a 1 s stage from which on the engine runs
 
 
 def engine_runs(
-    on_share: NDArray[np.float64], arrival_s: int | None, seen: Observation, vehicle: Vehicle
+    on_share: NDArray[np.float64],
+    arrival_s: int | None,
+    seen: Observation,
+    vehicle: Vehicle,
+    least_w: float = 0.0,
 ) -> bool:
     """Return whether the engine is to run in the coming second.
 
     With sigma_k the share of the k-th second ahead and b the seconds that a change binds
     (`engine.min_on_s` for a start, `engine.min_off_s` for a stop; at least 1), it is on where
-    sigma_0 >= 1/2, but
+    sigma_0 >= 1/2, and where the ramp asks for power now, but
 
     - it is started only if the mean of sigma over the next b seconds is 1/2 at least and arrival
-      is no nearer than b seconds, or if the battery alone cannot drive
+      is no nearer than b seconds, or if the battery alone cannot drive or the ramp asks for it
     - it is stopped only if that mean is 1/2 at most
 
     Parameters
@@ -34,9 +38,10 @@ def engine_runs(
     arrival_s : seconds until the trip ends; None where that is beyond the plan
     seen : the present
     vehicle : gives b
+    least_w : engine power that the ramp asks for now, see `qpmpc.controllers.ramp`
     """
     engine, battery = vehicle.engine, vehicle.battery
-    wish = bool(on_share[0] >= ON_THRESHOLD)
+    wish = bool(on_share[0] >= ON_THRESHOLD) or least_w > 0.0
     if wish == seen.engine_on:
         return wish
     bound_s = max(engine.min_on_s if wish else engine.min_off_s, 1)
@@ -45,6 +50,6 @@ def engine_runs(
     mean = float(ahead.sum()) / len(ahead)
     if not wish:
         return mean > ON_THRESHOLD
-    must = seen.demand_w + battery.aux_power_w > battery.power_discharge_max_w
+    must = least_w > 0.0 or seen.demand_w + battery.aux_power_w > battery.power_discharge_max_w
     arrives = arrival_s is not None and arrival_s < bound_s
     return must or (mean >= ON_THRESHOLD and not arrives)

@@ -42,6 +42,7 @@ class Plan:
     iterations : taken by the solver
     relaxation_gap : slack of the relaxation at the first second, relative; nan if there is none
     arrival_s : second of the plan in which the trip ends; None where it ends later
+    least_w : engine power that the first second needs at least, see `qpmpc.controllers.ramp`
     """
 
     on_share: NDArray[np.float64]
@@ -52,14 +53,20 @@ class Plan:
     reason: str = ""
     flags: Flag = NOTHING_WRONG
     arrival_s: int | None = None
+    least_w: float = 0.0
 
     @classmethod
     def of_means(
-        cls, on_share: ArrayLike, p_eng_w: ArrayLike, arrival_s: int | None = None
+        cls,
+        on_share: ArrayLike,
+        p_eng_w: ArrayLike,
+        arrival_s: int | None = None,
+        least_w: float = 0.0,
     ) -> "Plan":
         """Return the plan of mean engine powers E = sigma P_on; shape (n,) each."""
         share, mean_w = np.asarray(on_share, dtype=float), np.asarray(p_eng_w, dtype=float)
-        return cls(share, power_while_on_w(share, mean_w), arrival_s=arrival_s)
+        power_on_w = power_while_on_w(share, mean_w)
+        return cls(share, power_on_w, arrival_s=arrival_s, least_w=least_w)
 
     @classmethod
     def none(
@@ -183,10 +190,11 @@ class RecedingHorizon(Controller):
         """On or off, at the power of the next second in which the plan runs."""
         ahead = plan.on_share[second:]
         arrival_s = None if plan.arrival_s is None else plan.arrival_s - second
-        if not engine_runs(ahead, arrival_s, seen, self.trip.vehicle):
+        least_w = plan.least_w if second == 0 else 0.0
+        if not engine_runs(ahead, arrival_s, seen, self.trip.vehicle, least_w):
             return Command(False, 0.0)
         running = second + int(np.argmax(ahead >= ON_THRESHOLD))
-        return Command(True, float(plan.power_on_w[running]))
+        return Command(True, max(float(plan.power_on_w[running]), least_w))
 
     def _checked(self, plan: Plan, second: int) -> Plan:
         """Refuse what is no plan; take one that is not finite as unusable."""

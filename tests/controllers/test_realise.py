@@ -40,6 +40,12 @@ def test_a_change_needs_most_of_the_seconds_that_it_binds(on_share, arrival_s, s
     assert engine_runs(np.array(on_share, dtype=float), arrival_s, seen, CAR) is runs
 
 
+@pytest.mark.parametrize("seen", [ON, OFF])
+def test_the_ramp_starts_the_engine_and_keeps_it_on_whatever_the_plan(seen):
+    assert engine_runs(np.zeros(20), None, seen, CAR, least_w=1.0)
+    assert engine_runs(np.zeros(2), 2, seen, CAR, least_w=1.0)  # limits come before a short run
+
+
 @given(SHARES, st.none() | st.integers(1, 19), st.booleans())
 def test_an_engine_without_limits_follows_the_share(on_share, arrival_s, engine_on):
     seen = OFF._replace(engine_on=engine_on)

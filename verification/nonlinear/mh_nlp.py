@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from qpmpc.controllers.ramp import RampFloor
 from qpmpc.controllers.realise import ON_THRESHOLD
 from qpmpc.controllers.receding_horizon import Plan, Planner
 from qpmpc.controllers.settings import SettingsLike
@@ -36,6 +37,7 @@ class MhNlp(Planner):
         problem = NlpProblem(trip.vehicle, self.preview.count, self._short, of_qp.qp)
         self.solver = NlpSolver(problem)
         self._shift = self.preview.shift()
+        self._ramp = RampFloor(trip.vehicle)
         self._last: NlpPlan | None = None
         self._last_step = 0
 
@@ -54,7 +56,10 @@ class MhNlp(Planner):
         for stage in np.flatnonzero(on_share >= ON_THRESHOLD).tolist():
             powers_w[stage] = solved.power_on_w(stage)
         arrival_s = solved.stages.arrival_s(self._short)
-        return Plan(on_share, powers_w, True, solved.iterations, arrival_s=arrival_s)
+        least_w = self._ramp.least_w(solved.stages.seconds_w(self._short), seen.soc)
+        return Plan(
+            on_share, powers_w, True, solved.iterations, arrival_s=arrival_s, least_w=least_w
+        )
 
     def forget(self) -> None:
         """Forget preview and last solution, as after a restart of the controller under way."""
