@@ -160,7 +160,7 @@ MUTATIONS = [
     ),
     Mutation(
         "long horizon is a second late", StageBuilder, "_long_start",
-        "np.clip(step + n_short, self", "np.clip(step + n_short + 1, self", STAGES,
+        "np.clip(self.beyond(step), self", "np.clip(self.beyond(step + 1), self", STAGES,
     ),
     Mutation(
         "battery loss of the mean, not mean loss", qpmpc.preview.stages, "_fields",
