@@ -86,7 +86,7 @@ def _drive(
         solver=controller.solver_name,
         implementation=controller.implementation,
         remarks=(
-            *trip.cycle.remarks,
+            *trip.remarks,
             *controller.remarks,
             *_fallbacks(controller.name, record.fallback),
         ),

@@ -8,6 +8,7 @@ import numpy as np
 
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.errors import InputError
+from qpmpc.preview import place
 from qpmpc.preview.checked import CheckedPreview
 from qpmpc.preview.forecast import Trace
 from qpmpc.preview.horizon import HorizonSettings
@@ -108,6 +109,12 @@ class Trip:
             self._demand_w[step],
             self._speed_mps[step],
         )
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a user should know of the cycle and of its forecast, one line each."""
+        of_forecast = place.remark(self.truth, self.forecast)
+        return (*self.cycle.remarks, of_forecast) if of_forecast else tuple(self.cycle.remarks)
 
     @property
     def start(self) -> Observation:

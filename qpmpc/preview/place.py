@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from qpmpc.preview.forecast import Trace
 
+ANOTHER_ROUTE = 0.1  # of the way: a forecast that is off by more is said to be
+
 CATCH_UP = 2
 """Seconds of a forecast that may pass in one: more would look like another route."""
 
@@ -43,3 +45,12 @@ def forecast_seconds(truth: Trace, forecast: Trace) -> NDArray[np.intp]:
         second = min(max(wanted, second), second + CATCH_UP, forecast.steps)
         seconds[k] = second
     return seconds
+
+
+def remark(truth: Trace, forecast: Trace) -> str:
+    """Say how a forecast is read whose way has another length; empty if it has the same."""
+    way_km, expected_km = (1e-3 * float(of.speed_mps.sum()) for of in (truth, forecast))
+    if abs(expected_km - way_km) <= ANOTHER_ROUTE * way_km:
+        return ""
+    how = "by the share of its way driven" if min(way_km, expected_km) > 0.0 else "by the clock"
+    return f"the forecast has {expected_km:.3g} km, the trip {way_km:.3g} km: it is read {how}"

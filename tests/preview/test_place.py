@@ -8,10 +8,12 @@ from hypothesis import strategies as st
 from qpmpc.cycles import load_cycle
 from qpmpc.preview.forecast import Trace
 from qpmpc.preview.forecast_errors import MODELS, forecast
-from qpmpc.preview.place import CATCH_UP, forecast_seconds
+from qpmpc.preview.place import CATCH_UP, forecast_seconds, remark
+from qpmpc.simulation import simulate
 from qpmpc.vehicle import load_vehicle
 
 CAR = load_vehicle()
+LONGER = "the forecast has 16.5 km, the trip 1.9 km"  # hwfet for nycc
 SPEEDS = st.lists(st.sampled_from([0.0, 1e-9, 3.0, 8.0, 30.0]) | st.floats(0.0, 40.0), min_size=1)
 
 
@@ -70,3 +72,25 @@ def test_every_model_of_wrong_forecasts_is_read_to_its_end():
     for model in MODELS:
         said = forecast(cycle, CAR, model, 3)
         assert said.steps - forecast_seconds(truth, said)[-1] <= 120, model  # a stop at the end
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        (
+            "hwfet",
+            ["the forecast has 16.5 km, the trip 1.9 km: it is read by the share of its way"],
+        ),
+        ("nycc", []),
+    ],
+)
+def test_a_forecast_of_another_way_is_said_to_be_read(name, said):
+    remarks = simulate("nycc", "rule-based", forecast=load_cycle(name)).summary()["remarks"]
+    found = [line for line in remarks if line.startswith("the forecast has")]
+    assert found == said
+
+
+def test_a_forecast_without_a_way_is_said_to_be_read_by_the_clock():
+    line = remark(trace(np.full(20, 10.0)), trace(np.zeros(30)))
+    assert line == "the forecast has 0 km, the trip 0.2 km: it is read by the clock"
+    assert remark(trace([0.0]), trace([0.0])) == ""
