@@ -70,6 +70,6 @@ mpc_command mpc_realise(const mpc_state *state)
             is_found = 1;
         }
     }
-    command.p_eng_w = (on != 0) ? real_max(command.p_eng_w, least_w) : REAL(0.0);
+    command.p_eng_w = real_max(command.p_eng_w, least_w); /* above 0 only with the engine on */
     return command;
 }

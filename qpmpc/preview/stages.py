@@ -44,7 +44,7 @@ class Stages:
 
     def arrival_s(self, short_stages: int) -> int | None:
         """Seconds until arrival, None where that is beyond the first `short_stages` of 1 s."""
-        count = int(np.count_nonzero(self.duration_s[:short_stages]))
+        count = len(self.seconds_w(short_stages))
         return count if count < short_stages else None
 
     def seconds_w(self, short_stages: int) -> NDArray[np.float64]:
