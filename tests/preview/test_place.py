@@ -79,7 +79,7 @@ def test_every_model_of_wrong_forecasts_is_read_to_its_end():
     [
         (
             "hwfet",
-            ["the forecast has 16.5 km, the trip 1.9 km: it is read by the share of its way"],
+            [f"{LONGER}: it is read by the share of its way driven"],
         ),
         ("nycc", []),
     ],
