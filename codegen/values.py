@@ -40,11 +40,11 @@ CONSTANTS: dict[str, dict[str, float]] = {
         (safety, "POWER_MARGIN_W SOC_MARGIN T_CL_MARGIN_K"),
         (monitor, "LONG_AGO_S LONGEST_GAP_S"),
         (checked, "LONGEST_STAGE_S NEWS"),
-        (swing, "NO_LIMIT_J"),
+        (swing, "NO_LIMIT_J LEAST_KEPT_J"),
         (stage_qp, "LEAST_COST"),
         (polish, "LEAST_RATIO"),
         (coolant_floor, "USABLE"),
-        (rows, "SHORTEST_SCALE_S ACCURATE_STAGE_S SIGMA_FORCED MOOT_G_PER_S"),
+        (rows, "SHORTEST_SCALE_S SIGMA_FORCED COOL_SHARE MOOT_G_PER_S"),
         (base, "LARGEST_PLAUSIBLE"),
         (demand, "GRAVITY_MPS2"),
     )

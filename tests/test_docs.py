@@ -45,7 +45,9 @@ def help_texts(names: Container[str]) -> list[str]:
 ALL_NAMES = [command.callback.__name__ for command in app.registered_commands]
 EXAMPLES = commands_in(
     [text for _, text in blocks("sh")]
-    + help_texts(["simulate", "compare", "codegen", "cycles", "vehicles"])  # others take minutes
+    + help_texts(
+        ["simulate", "compare", "codegen", "cycles", "vehicles", "vehicle_from_map"]
+    )  # others take minutes
 )
 
 
@@ -63,7 +65,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     car = files("qpmpc.vehicle").joinpath("data", "prius-liion.toml").read_text("utf-8")
     (tmp_path / "my_car.toml").write_text(car.replace("prius-liion", "my-car"))
-    for _, text in blocks("toml"):
+    for _, text in [*blocks("toml"), *blocks("csv")]:
         name = text.splitlines()[0].removeprefix("# ")
         (tmp_path / name).write_text(text, "utf-8")
     speeds = [0, 2, 5, 8, 11, 13, 14, 14, 14, 14, 14, 12, 9, 6, 3, 0]

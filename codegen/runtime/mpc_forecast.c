@@ -8,6 +8,7 @@
  */
 #include "mpc_forecast.h"
 #include "mpc_battery_side.h"
+#include "mpc_constants.h"
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
@@ -110,7 +111,8 @@ static mpc_swing swing_of(const mpc_forecast *forecast, int32_t first)
 }
 
 /* At the end of each block: a share of the swing in it and in the next, at most half of the room
- * between the limits. An averaged preview knows nothing of it. */
+ * between the limits and at least something, by which the end of a block is known. An averaged
+ * preview knows nothing of the swing. */
 static void find_swings(mpc_forecast *forecast)
 {
     const mpc_real room = mpc_par.soc_max - mpc_par.soc_min;
@@ -120,8 +122,10 @@ static void find_swings(mpc_forecast *forecast)
     for (int32_t block = MPC_BLOCKS - 1; block >= 0; block--) {
         const mpc_swing own = swing_of(forecast, block * forecast->block_s);
         mpc_swing *const kept = &forecast->swing[block];
-        kept->fall_j = real_min(share * real_max(own.fall_j, next.fall_j), most_j);
-        kept->rise_j = real_min(share * real_max(own.rise_j, next.rise_j), most_j);
+        kept->fall_j =
+            real_max(real_min(share * real_max(own.fall_j, next.fall_j), most_j), LEAST_KEPT_J);
+        kept->rise_j =
+            real_max(real_min(share * real_max(own.rise_j, next.rise_j), most_j), LEAST_KEPT_J);
         next = own;
     }
 }
@@ -204,9 +208,11 @@ static void fill_long(const mpc_forecast *forecast, int32_t is_arriving, mpc_in 
         in->long_speed_mps[k] = share * mean_of(&of->speed_mps, seconds);
         in->long_rises[k] = (is_arriving != 0) ? REAL(0.0) : (mpc_real)of->rises;
         const mpc_swing *const swing = &forecast->swing[k / MPC_CLASSES];
-        const int32_t block_end = ((k / MPC_CLASSES) + 1) * forecast->block_s;
-        const int32_t end = (block_end < forecast->covered) ? block_end : forecast->covered;
-        const int32_t is_ahead = ((is_arriving == 0) && (forecast->next < end)) ? 1 : 0;
+        const int32_t first = (k / MPC_CLASSES) * forecast->block_s;
+        const int32_t after = first + forecast->block_s;
+        const int32_t end = (after < forecast->covered) ? after : forecast->covered;
+        const int32_t is_ahead =
+            ((is_arriving == 0) && (first < end) && (forecast->next < end)) ? 1 : 0;
         in->long_fall_j[k] = (is_ahead != 0) ? swing->fall_j : REAL(0.0);
         in->long_rise_j[k] = (is_ahead != 0) ? swing->rise_j : REAL(0.0);
         /* with one class the preview is averaged: it has only the mean demand */

@@ -18,6 +18,7 @@ from qpmpc.cli.simulate import simulate
 from qpmpc.cli.studies import report, studies
 from qpmpc.cli.sweep import sweep
 from qpmpc.cli.trips import trips
+from qpmpc.cli.vehicle_from_map import vehicle_from_map
 from qpmpc.cli.vehicles import vehicles
 from qpmpc.cli.verify import verify
 from qpmpc.errors import InputError, QpmpcError
@@ -48,6 +49,7 @@ app.command()(report)
 app.command()(cycles)
 app.command()(trips)
 app.command()(vehicles)
+app.command()(vehicle_from_map)
 
 
 def _version(wanted: bool) -> None:

@@ -88,6 +88,8 @@ def _parameters(vehicle: "Vehicle") -> "ShownTable":
     table.add_column("unit", no_wrap=True)
     for section, values in vehicle.model_dump(exclude={"name", "description"}).items():
         for key, value in values.items():
+            if value is None:
+                continue
             items = value if isinstance(value, tuple) else (value,)
             text = " ".join(f"{item:.10g}" for item in items)
             table.add_row(f"{section}.{key}", text, unit_of(key))

@@ -31,7 +31,8 @@ class Stages:
     rises : r_k, starts of the engine in the stage per on-share that it has more than the stage
         before: u_k >= r_k (sigma_k - sigma_k-1)
     fall_j, rise_j : energy that SOC keeps from its lower and its upper limit at the stage's end,
-        see `qpmpc.preview.swing`; 0 for 1 s, -NO_LIMIT_J inside a block, where it is not limited
+        see `qpmpc.preview.swing`: more than 0 at the end of a block ahead, 0 for 1 s, -NO_LIMIT_J
+        inside a block, where it is not limited
     """
 
     duration_s: NDArray[np.float64]

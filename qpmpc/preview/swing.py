@@ -18,6 +18,8 @@ Floats = NDArray[np.float64]
 
 NO_LIMIT_J = 1e10
 """Beyond any car's battery: of the classes inside a block, whose order in time is not known."""
+LEAST_KEPT_J = 1.0
+"""Tells the end of a block, with however little swing, from a second and from a block passed."""
 
 
 def swings(
@@ -39,8 +41,8 @@ def swings(
 
         fall_b = s max(-min path_b, -min path_b+1),   rise_b = s max(max path_b, max path_b+1)
 
-    each at most half of the room between the limits. One class has no swing: an averaged preview
-    knows nothing of it.
+    each at least `LEAST_KEPT_J` and at most half of the room between the limits. One class has no
+    swing: an averaged preview knows nothing of it.
 
     Parameters
     ----------
@@ -52,7 +54,7 @@ def swings(
     fall and rise, shape (2, blocks)
     """
     if settings.classes == 1 or not len(start):
-        return np.zeros((2, len(start)))
+        return np.full((2, len(start)), LEAST_KEPT_J)
     flow_w = -forecast.internal_off_w(vehicle)
     is_hard = forecast.demand_w > settings.class_hard_w
     own = np.array([_swing(flow_w[a:b], is_hard[a:b]) for a, b in zip(start, end, strict=True)]).T
@@ -61,7 +63,7 @@ def swings(
     room = battery.soc_max - battery.soc_min
     most = 0.5 * room * BatteryMaps(battery).energy_j(vehicle.trip.soc_init)
     kept: Floats = np.minimum(settings.swing_share * np.maximum(own, following), most)
-    return kept
+    return np.maximum(kept, LEAST_KEPT_J)
 
 
 def _swing(flow_w: Floats, is_hard: NDArray[np.bool_]) -> tuple[float, float]:

@@ -24,7 +24,7 @@ from qpmpc.qp.expressions import FormulaError, expression, terms_of
 from qpmpc.vehicle.parameters import Engine
 
 SHORTEST_SCALE_S = 1.0  # a masked stage is scaled as one of 1 s
-ACCURATE_STAGE_S = 1.0  # a stage of this length or less is known, a longer one is forecast
+COOL_SHARE = 0.5  # of the SOC reserve, where the thermostat is closed
 MOOT_G_PER_S = 5.0  # a bound on fuel that is never met
 SIGMA_FORCED = 0.99  # "engine must be on" as a lower bound on sigma, kept apart from the upper one
 
@@ -68,13 +68,14 @@ missing_w = net_w - battery_discharge_max_w
 # fuel above its curve would be heat without power: none where heat has to be had in good time
 waste_g_per_s = where(highest_floor_degc > t_min_degc, 0.0, MOOT_G_PER_S)
 
-# SOC limits with the reserve of forecast stages, tightened by the swing inside a block, and the
-# terminal band, no higher than charging all the way leads to: a limit above that is moot;
-# inside a block there is none, or -1 and 2
+# SOC limits tightened by the swing inside a block, with a reserve at the end of forecast ones, the
+# whole of it where the coolant may limit the engine, and the terminal band, no higher than charging
+# all the way leads to: a limit above that is moot; inside a block there is none, or -1 and 2
 strongest_w = max(net_w - engine_max_w, -battery_charge_max_w)
 spent_soc = running(duration_s * pwa_battery(strongest_w) / battery_energy_j)
 reach_soc = start_soc - spent_soc - reach_margin_soc
-limit_soc = max(soc_min + fall_j / battery_energy_j, -1.0) + where(duration_s > ACCURATE_STAGE_S, soc_reserve, 0.0)
+reserve_soc = soc_reserve * where(about_t_cl_degc > thermostat_open_degc, 1.0, COOL_SHARE)
+limit_soc = max(soc_min + fall_j / battery_energy_j, -1.0) + where(fall_j > 0.0, reserve_soc, 0.0)
 top_soc = min(soc_max - rise_j / battery_energy_j, 2.0)
 last_low_soc = where(soc_penalty_g > 0.0, limit_soc, terminal_soc_low)
 last_high_soc = where(soc_penalty_g > 0.0, top_soc, terminal_soc_high)

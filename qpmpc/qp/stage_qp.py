@@ -35,8 +35,9 @@ class QpSettings(BaseModel):
     ----------
     terminal_low, terminal_high : terminal SOC band as multiples of the initial SOC (paper eq. 11)
     soc_penalty_g : lambda of a quadratic terminal cost, g per (unit SOC)^2, instead of the band
-    soc_reserve : share of the room between the lower SOC limit and the initial SOC that stages of
-        more than 1 s are planned to leave, for errors of the forecast
+    soc_reserve : share of the room between the lower SOC limit and the initial SOC that is planned
+        to be left at the end of a block in which the thermostat opens, half of it where not: if the
+        coolant limits the engine more than the plan knows, the battery has to give the rest
     t_cl_margin_k : the coolant is planned to stay this far above its lower limit, beside the
         reserve of `heat_reserve_k`
     slack_g_per_k : price of exceeding a coolant limit, g per K and stage
@@ -49,7 +50,7 @@ class QpSettings(BaseModel):
     terminal_high: Annotated[float, Field(gt=0.0, le=1.5)] = 1.01
     soc_penalty_g: Annotated[float, Field(ge=0.0, le=1e9)] = 0.0
     soc_reserve: Annotated[float, Field(ge=0.0, le=0.9)] = 0.42
-    t_cl_margin_k: Annotated[float, Field(ge=0.0, le=10.0)] = 0.5
+    t_cl_margin_k: Annotated[float, Field(ge=0.0, le=10.0)] = 0.3
     slack_g_per_k: Annotated[float, Field(ge=1e-6, le=1e6)] = 10.0
     regularisation: Annotated[float, Field(ge=0.0, le=1.0)] = 1e-5
 

@@ -58,6 +58,7 @@ def compare_html(
             (f"{section}.{key}", _text(value), unit_of(key))
             for section, values in vehicle.model_dump(exclude={"name", "description"}).items()
             for key, value in values.items()
+            if value is not None
         ],
         settings=preformatted(json.dumps(settings.model_dump(include=names), indent=2)),
         provenance=provenance(),

@@ -14,6 +14,7 @@ from qpmpc.report.pwa_curves import PwaCurve
 from qpmpc.report.trajectory_csv import trajectory_csv
 from qpmpc.report.trip_set import cycle_csv
 from qpmpc.results import Run
+from qpmpc.vehicle.from_map import MappedVehicle
 from qpmpc.vehicle.parameters import Vehicle
 
 PLOT_EXTRA = "pip install 'qpmpc-iptm[plot]'"
@@ -138,6 +139,17 @@ def write_pwa(vehicle: Vehicle, curves: Sequence[PwaCurve], folder: Path) -> lis
         return draw_pwa(vehicle.name, curves)
 
     file = folder / f"pwa_{vehicle.name}.png"
+    return _write_picture(file, draw) or [f"{file} written"]
+
+
+def write_engine(mapped: MappedVehicle, fuel: PwaCurve, file: Path) -> list[str]:
+    """Draw a measured engine; returns remarks."""
+
+    def draw() -> bytes:
+        from qpmpc.report.engine_picture import draw_engine
+
+        return draw_engine(mapped, fuel)
+
     return _write_picture(file, draw) or [f"{file} written"]
 
 

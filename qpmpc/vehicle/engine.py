@@ -1,6 +1,7 @@
 """Engine: fuel map, optimal operating line, cold multiplier."""
 
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -8,6 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 from qpmpc.errors import InputError
 from qpmpc.vehicle.parameters import ColdEngine, Engine
 from qpmpc.vehicle.table import Table
+
+Floats = NDArray[np.float64]
 
 LINE_STEP_W = 50.0
 MAP_STEP_RPM = 5.0
@@ -28,42 +31,74 @@ def fuel_power_w(engine: Engine, speed_rpm: ArrayLike, power_w: ArrayLike) -> ND
     fuel power in W, same shape; the torque limit is not checked here
     """
     speed = np.asarray(speed_rpm, dtype=float)
-    friction = np.interp(speed, engine.friction_speed_rpm, engine.friction_kj_per_rev_l)
-    pumping_w = 1e3 * friction * engine.displacement_l * speed / 60.0
-    return np.asarray(pumping_w + np.asarray(power_w) / engine.indicated_efficiency)
+    friction = np.interp(
+        speed, _of_map(engine.friction_speed_rpm), _of_map(engine.friction_kj_per_rev_l)
+    )
+    pumping_w = 1e3 * friction * _of_map(engine.displacement_l) * speed / 60.0
+    return np.asarray(pumping_w + np.asarray(power_w) / _of_map(engine.indicated_efficiency))
+
+
+Value = TypeVar("Value")
+
+
+def _of_map(value: Value | None) -> Value:
+    if value is None:
+        raise InputError("this engine is given by its optimal line: it has no map over speed")
+    return value
 
 
 class OptimalLine:
     """Optimal operating line: at each power the speed of least fuel within the torque limit.
 
+    Of an engine that is given by its line, that line; between its points fuel is linear.
+
     Attributes
     ----------
-    power_w, speed_rpm, torque_nm, fuel_g_per_s : arrays along the line, shape (m,)
+    power_w, speed_rpm, torque_nm, fuel_g_per_s : arrays along the line, shape (m,); speed and
+        torque are NaN where an engine's line comes without speed
     fuel : `Table` power_w -> fuel_g_per_s of the hot engine, engine on
     power_max_w : rated power
     """
 
     def __init__(self, engine: Engine) -> None:
-        low = max(engine.friction_speed_rpm[0], engine.torque_speed_rpm[0])
-        high = min(engine.friction_speed_rpm[-1], engine.torque_speed_rpm[-1])
+        count = int(np.ceil(engine.power_max_w / LINE_STEP_W)) + 1
+        self.power_w = np.linspace(0.0, engine.power_max_w, count)
+        if engine.line_power_w is None:
+            self.speed_rpm, self.fuel_g_per_s = self._from_map(engine)
+        else:
+            self.speed_rpm, self.fuel_g_per_s = self._given(engine)
+        self.torque_nm = self.power_w / (self.speed_rpm * (2.0 * np.pi / 60.0))
+        self.fuel = Table(self.power_w, self.fuel_g_per_s)
+        self.power_max_w = engine.power_max_w
+
+    def _given(self, engine: Engine) -> tuple[Floats, Floats]:
+        power_w = np.array(engine.line_power_w)
+        if engine.line_speed_rpm is None:
+            speed_rpm = np.full_like(self.power_w, np.nan)
+        else:
+            speed_rpm = np.interp(self.power_w, power_w, engine.line_speed_rpm)
+        return speed_rpm, np.interp(self.power_w, power_w, np.array(engine.line_fuel_g_per_s))
+
+    def _from_map(self, engine: Engine) -> tuple[Floats, Floats]:
+        friction_rpm, torque_rpm = (
+            _of_map(engine.friction_speed_rpm),
+            _of_map(engine.torque_speed_rpm),
+        )
+        low = max(friction_rpm[0], torque_rpm[0])
+        high = min(friction_rpm[-1], torque_rpm[-1])
         speed = np.arange(low, high + MAP_STEP_RPM, MAP_STEP_RPM).clip(max=high)
         omega = speed * (2.0 * np.pi / 60.0)
-        limit_w = np.interp(speed, engine.torque_speed_rpm, engine.torque_max_nm) * omega
+        limit_w = np.interp(speed, torque_rpm, _of_map(engine.torque_max_nm)) * omega
         if limit_w.max() < engine.power_max_w * (1.0 - 1e-3):
             raise InputError(
                 f"engine.power_max_w: {engine.power_max_w:.0f} W is above the "
                 f"{limit_w.max():.0f} W that torque_max_nm allows"
             )
-        count = int(np.ceil(engine.power_max_w / LINE_STEP_W)) + 1
-        self.power_w = np.linspace(0.0, engine.power_max_w, count)
         fuel_w = fuel_power_w(engine, speed[None, :], self.power_w[:, None])
         reachable = limit_w[None, :] >= np.minimum(self.power_w, limit_w.max())[:, None]
         best = np.where(reachable, fuel_w, np.inf).argmin(axis=1)
-        self.speed_rpm = speed[best]
-        self.torque_nm = self.power_w / omega[best]
-        self.fuel_g_per_s = fuel_w[np.arange(count), best] / engine.lhv_j_per_kg * 1e3
-        self.fuel = Table(self.power_w, self.fuel_g_per_s)
-        self.power_max_w = engine.power_max_w
+        fuel_g_per_s = fuel_w[np.arange(len(best)), best] / engine.lhv_j_per_kg * 1e3
+        return speed[best], fuel_g_per_s
 
 
 @lru_cache(maxsize=LINES_KEPT)

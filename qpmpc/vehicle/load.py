@@ -16,7 +16,7 @@ from qpmpc.input_text import read_text
 from qpmpc.problems import shown_value
 from qpmpc.settings import load_toml, validated
 from qpmpc.vehicle.names import DEFAULT_VEHICLE, VEHICLES
-from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.vehicle.parameters import LINE, LINE_TOO, MAP, Vehicle
 
 MEGABYTES_MAX = 1
 """A vehicle's file has some kilobytes."""
@@ -84,7 +84,8 @@ def merged_vehicle(files: tuple[VehicleFile, ...]) -> Vehicle:
     """
     data: dict[str, Any] = {}
     for file in reversed(files):
-        data = _merged(data, {key: value for key, value in file.data.items() if key != "base"})
+        own = {key: value for key, value in file.data.items() if key != "base"}
+        data = _merged(_without_other_engine(data, own), own)
     if "name" not in files[0].data:
         data.pop("name", None)  # two vehicles of one name could not be told apart in results
     labels = {key: file.label for key, file in origins(files).items()}
@@ -138,6 +139,18 @@ def _merged(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
         else:
             result[key] = value
     return result
+
+
+def _without_other_engine(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
+    """Drop the base's description of the engine's fuel where a file brings the other sort."""
+    under, over = base.get("engine"), own.get("engine")
+    if not (isinstance(under, dict) and isinstance(over, dict)):
+        return base
+    of_line = (*LINE, *LINE_TOO)
+    dropped = (
+        MAP if any(k in over for k in of_line) else of_line if any(k in over for k in MAP) else ()
+    )
+    return {**base, "engine": {k: v for k, v in under.items() if k not in dropped}}
 
 
 def _dotted_keys(data: dict[str, Any]) -> Iterator[str]:

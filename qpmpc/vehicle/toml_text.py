@@ -65,6 +65,8 @@ def vehicle_toml(vehicle: Vehicle, comments: Mapping[str, Comment] | None = None
             continue
         lines += ["", *_entry(f"[{name}]", "", comment)]
         for key, number in value.items():
+            if number is None:
+                continue
             written = _array(key, number) if isinstance(number, tuple) else repr(number)
             lines += _entry(key, written, known.get(f"{name}.{key}", nothing))
     return "\n".join(lines) + "\n"

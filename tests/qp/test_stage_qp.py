@@ -170,14 +170,20 @@ def test_scaling_leads_back():
     np.testing.assert_allclose(scaling.dual(scaling.solver_dual(y)), y)
 
 
-def test_forecast_stages_keep_a_reserve_of_charge_and_known_ones_do_not():
+@pytest.mark.parametrize("t_cl_degc", [60.0, 88.0])
+def test_ends_of_blocks_keep_a_reserve_of_charge_more_where_the_thermostat_opens(t_cl_degc):
     qp = _qp(soc_reserve=0.5)
     stages = BUILDER.at(0)
-    data = qp.update(stages, 0.6, 60.0, _about())
+    about = _about()
+    about = replace(about, t_cl_degc=np.full_like(about.t_cl_degc, t_cl_degc))
+    data = qp.update(stages, 0.6, t_cl_degc, about)
     lower = (data.lower / data.scaling.row).reshape(qp.stages, -1)
     planned = lower[:, qp.rows.first("box_soc")]
     battery, trip = VEHICLE.battery, VEHICLE.trip
-    reserved = np.where(stages.duration_s > 1.0, 0.5 * (trip.soc_init - battery.soc_min), 0.0)
+    share = 0.5 if t_cl_degc > VEHICLE.thermal.thermostat_open_degc else 0.25
+    ends = (np.arange(qp.stages) - BUILDER.settings.short_stages) % 3 == 2
+    ends[: BUILDER.settings.short_stages] = False
+    reserved = np.where(ends, share * (trip.soc_init - battery.soc_min), 0.0)
     swing = stages.fall_j / MODEL.battery_energy_j
     expected = np.maximum(battery.soc_min + swing, -1.0) + reserved  # -1: none
     assert planned[:-1] == pytest.approx(expected[:-1])

@@ -67,7 +67,7 @@ def test_wrong_entries_of_an_array_are_not_called_missing_too():
 
 def test_of_many_problems_the_first_are_named_and_the_others_counted():
     line = line_of({table: {} for table in ("engine", "battery", "thermal")})
-    assert line.startswith("my.toml: missing name, [chassis], engine.displacement_l, ")
+    assert line.startswith("my.toml: missing name, [chassis], engine.power_max_w, ")
     missing = sum(
         field.is_required()
         for table in ("engine", "battery", "thermal")

@@ -130,7 +130,7 @@ MUTATIONS = [
         "alpha_at(vehicle.cold_engine, state.t_cl_degc)", "1.0", PLANT,
     ),
     Mutation(
-        "heating value in kJ", OptimalLine, "__init__",
+        "heating value in kJ", OptimalLine, "_from_map",
         "engine.lhv_j_per_kg * 1e3", "engine.lhv_j_per_kg", (engine_covers_demand, *NLP),
         ("No battery use", "First command, power", "Predicted T_cl", "Planned fuel"),
     ),

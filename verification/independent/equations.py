@@ -55,6 +55,14 @@ class Equations:
         """Fuel rate of the hot engine, on: least over speed within the torque limit; shape (m,)."""
         engine = self.vehicle.engine
         power = np.atleast_1d(np.asarray(power_w, dtype=float))
+        if engine.line_power_w is not None and engine.line_fuel_g_per_s is not None:
+            return np.asarray(np.interp(power, engine.line_power_w, engine.line_fuel_g_per_s))
+        assert engine.friction_speed_rpm is not None
+        assert engine.friction_kj_per_rev_l is not None
+        assert engine.torque_speed_rpm is not None
+        assert engine.torque_max_nm is not None
+        assert engine.displacement_l is not None
+        assert engine.indicated_efficiency is not None
         low = max(engine.friction_speed_rpm[0], engine.torque_speed_rpm[0])
         high = min(engine.friction_speed_rpm[-1], engine.torque_speed_rpm[-1])
         rpm = np.linspace(low, high, round((high - low) / SPEED_STEP_RPM) + 1)

@@ -100,7 +100,7 @@ def _kept_j(
             kept = [max(kept[0], -level), max(kept[1], level)]
     volts = float(Equations(vehicle).voltage_v(vehicle.trip.soc_init))
     half = 0.5 * (battery.soc_max - battery.soc_min) * volts * 3600.0 * battery.capacity_ah
-    return [min(settings.horizon.swing_share * each, half) for each in kept]
+    return [max(min(settings.horizon.swing_share * each, half), 1.0) for each in kept]
 
 
 class Expansion(NamedTuple):
@@ -367,8 +367,9 @@ def stage_program(
         reach -= h * charged / energy
         low = battery.soc_min + float(road.low_j[k]) / energy
         high = battery.soc_max - float(road.high_j[k]) / energy
-        if h > 1.0:  # forecast: a reserve is left
-            low += qp.soc_reserve * max(vehicle.trip.soc_init - battery.soc_min, 0.0)
+        if road.low_j[k] > 0.0:  # a block ends: a reserve is left, half of it where cool
+            part = 1.0 if t0 > th.thermostat_open_degc else 0.5
+            low += part * qp.soc_reserve * max(vehicle.trip.soc_init - battery.soc_min, 0.0)
         if k == n - 1:
             low = max(qp.terminal_low * vehicle.trip.soc_init, battery.soc_min)
             high = min(qp.terminal_high * vehicle.trip.soc_init, battery.soc_max)

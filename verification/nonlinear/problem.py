@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from qpmpc.preview.stages import Stages
 from qpmpc.qp.coolant_floor import CoolantFloor
 from qpmpc.qp.heat_reserve import heat_reserve_k
-from qpmpc.qp.rows import ACCURATE_STAGE_S, SHORTEST_SCALE_S, SIGMA_FORCED, Var, table_of
+from qpmpc.qp.rows import COOL_SHARE, SHORTEST_SCALE_S, SIGMA_FORCED, Var, table_of
 from qpmpc.qp.stage_qp import T_CL_MAX_MARGIN_K, QpSettings
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.heat import air_w
@@ -212,7 +212,12 @@ class NlpProblem:
         return lower, upper
 
     def data(
-        self, stages: Stages, soc: float, t_cl_degc: float, engine_on: bool = False
+        self,
+        stages: Stages,
+        soc: float,
+        t_cl_degc: float,
+        engine_on: bool = False,
+        t_cl_plan_degc: Floats | None = None,
     ) -> NlpData:
         """Parameters and bounds for a horizon and a state.
 
@@ -220,6 +225,8 @@ class NlpProblem:
         ----------
         stages : the trip ahead
         soc, t_cl_degc, engine_on : state at its start
+        t_cl_plan_degc : coolant at the ends of the stages in the plan of the step before, by which
+            blocks are hot; without one that of now, shape (n,)
         """
         battery, engine = self.vehicle.battery, self.vehicle.engine
         net = stages.net_w
@@ -229,7 +236,9 @@ class NlpProblem:
         must, can = net > battery.power_discharge_max_w, most > engine.power_min_w
         least = np.minimum(least, engine.power_max_w - POWER_GAP_W)
         most = np.maximum(most, least + POWER_GAP_W)
-        soc_low, soc_high = self._soc_limits(stages, soc)
+        hot_degc = t_cl_degc if t_cl_plan_degc is None else t_cl_plan_degc
+        is_hot = hot_degc > self.vehicle.thermal.thermostat_open_degc
+        soc_low, soc_high = self._soc_limits(stages, soc, is_hot)
         upper[:, NlpVar.SOC] = soc_high / UNIT[NlpVar.SOC]
         lower[:, NlpVar.T_CL], upper[:, NlpVar.T_CL] = self.vehicle.thermal.t_amb_degc, 120.0
         upper[:, NlpVar.ABOVE] = np.inf
@@ -250,7 +259,9 @@ class NlpProblem:
             row_upper=self._row_upper.ravel(),
         )
 
-    def _soc_limits(self, stages: Stages, soc: float) -> tuple[Floats, Floats]:
+    def _soc_limits(
+        self, stages: Stages, soc: float, is_hot: bool | NDArray[np.bool_]
+    ) -> tuple[Floats, Floats]:
         """Limits of SOC, with the QP's reserve and the swing inside blocks.
 
         The lower ones are no higher than charging throughout reaches.
@@ -260,7 +271,7 @@ class NlpProblem:
         energy_j = maps.energy_j(trip.soc_init)
         reserve = settings.soc_reserve * max(trip.soc_init - battery.soc_min, 0.0)
         low = np.maximum(battery.soc_min + stages.fall_j / energy_j, EMPTY)
-        low += np.where(stages.duration_s > ACCURATE_STAGE_S, reserve, 0.0)
+        low += np.where(stages.fall_j > 0.0, reserve * np.where(is_hot, 1.0, COOL_SHARE), 0.0)
         high = np.minimum(battery.soc_max - stages.rise_j / energy_j, FULL)
         if not settings.soc_penalty_g:
             low[-1] = max(settings.terminal_low * trip.soc_init, battery.soc_min)

@@ -117,7 +117,8 @@ class NlpSolver:
         soc, t_cl_degc, engine_on : state at its start
         start : plan to start from
         """
-        data = self.problem.data(stages, soc, t_cl_degc, engine_on)
+        planned = None if start is None else start.x[:, NlpVar.T_CL]
+        data = self.problem.data(stages, soc, t_cl_degc, engine_on, planned)
         if start is None:
             x0 = np.clip(self._departure(soc, t_cl_degc), data.lower, data.upper)
             return self._plan(stages, self._cold, data, x0=x0)

@@ -1,0 +1,204 @@
+"""A measured engine, from a CSV file as people have it: a map over speed and torque, or a curve."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpmpc.delimited import Column, DelimitedTable, read_delimited
+from qpmpc.errors import InputError
+from qpmpc.problems import shown_value
+
+Floats = NDArray[np.float64]
+
+MEGABYTES_MAX = 4
+POINTS_LEAST = 3
+EFFICIENCY_MAX = 0.6  # of any engine; more is a wrong unit
+
+# quantity -> names, and units -> size in SI; the unit may be the last part of the name too
+_SPEED = ("speed", "engine_speed", "rpm", "n", "omega")
+_TORQUE = ("torque", "engine_torque", "tau")
+_POWER = ("power", "engine_power", "p")
+_FUEL = ("fuel", "fuel_rate", "fuel_flow", "fuel_mass_flow", "consumption")
+_BSFC = ("bsfc", "be", "specific_consumption", "sfc")
+_EFFICIENCY = ("efficiency", "eta", "eff")
+_UNITS: dict[str, dict[str, float]] = {
+    "speed": {"rpm": 1.0, "1/min": 1.0, "rad/s": 30.0 / np.pi, "rad_per_s": 30.0 / np.pi},
+    "torque": {"nm": 1.0, "n_m": 1.0, "n*m": 1.0},
+    "power": {"w": 1.0, "kw": 1e3},
+    "fuel": {"g/s": 1.0, "g_per_s": 1.0, "kg/h": 1.0 / 3.6, "kg_per_h": 1.0 / 3.6, "kg/s": 1e3},
+    "bsfc": {"g/kwh": 1.0 / 3.6e6, "g_per_kwh": 1.0 / 3.6e6},
+    "efficiency": {"": 1.0, "-": 1.0, "1": 1.0, "%": 1e-2, "percent": 1e-2},
+}
+_NAMES = {
+    "speed": _SPEED,
+    "torque": _TORQUE,
+    "power": _POWER,
+    "fuel": _FUEL,
+    "bsfc": _BSFC,
+    "efficiency": _EFFICIENCY,
+}
+ALLOWED = (
+    "speed_rpm or speed_rad_per_s, torque_nm (a map) or power_kw or power_w (a curve), and one of "
+    "fuel_g_per_s, fuel_kg_per_h, bsfc_g_per_kwh, efficiency; units may be in brackets, as in "
+    "'Torque [Nm]', or in a row of their own"
+)
+
+
+@dataclass(frozen=True)
+class EngineData:
+    """Points of a hot engine that runs.
+
+    Attributes
+    ----------
+    power_w, fuel_g_per_s : shape (points,)
+    speed_rpm, torque_nm : likewise, or None for a curve over power
+    remarks : what was assumed, and what left out
+    """
+
+    power_w: Floats
+    fuel_g_per_s: Floats
+    speed_rpm: Floats | None
+    torque_nm: Floats | None
+    remarks: tuple[str, ...]
+
+
+def read_engine_data(path: Path, lhv_j_per_g: float) -> EngineData:
+    """Read a map (speed, torque, fuel) or a curve (power, fuel).
+
+    Fuel is a rate, a specific consumption or an efficiency: f = b P, or f = P / (eta LHV). Points
+    without power have neither of the last two, and are left out; points at which the engine is
+    dragged are too, and rows with an empty cell.
+
+    Parameters
+    ----------
+    path : CSV file, see `qpmpc.delimited`
+    lhv_j_per_g : lower heating value, where fuel is given as an efficiency
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a column is missing, named twice, of an unknown unit, or holds
+        what no engine does.
+    """
+    table = read_delimited(path, MEGABYTES_MAX)
+    found = _quantities(table)
+    remarks: list[str] = []
+    if "torque" in found and "speed" in found and "power" not in found:
+        speed, torque = found["speed"], found["torque"]
+        power = torque * speed * (np.pi / 30.0)
+    elif "power" in found and "torque" not in found:
+        speed, torque, power = None, None, found["power"]
+        if "speed" in found:
+            speed = found["speed"]
+    else:
+        raise InputError(f"{path}: needs {ALLOWED}")
+    how, given = _fuel_column(path, found)
+    drags, idles = power < 0.0, power == 0.0
+    unknown = np.isnan(power) | np.isnan(given)
+    if speed is not None:
+        unknown |= np.isnan(speed)
+    keep = ~(unknown | drags) if how == "fuel" else ~(unknown | drags | idles | (given <= 0.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if how == "fuel":
+            fuel = given
+        else:
+            fuel = given * power if how == "bsfc" else power / (given * lhv_j_per_g)
+    for count, what in (
+        (int(unknown.sum()), "with an empty cell"),
+        (int((drags & ~unknown).sum()), "at which the engine is dragged"),
+        (int((~keep & ~unknown & ~drags).sum()), f"without power or {how}"),
+    ):
+        if count:
+            remarks.append(f"{count} of {len(power)} points {what} left out")
+    if how == "efficiency":
+        remarks.append(f"efficiency counted with the base's heating value, {lhv_j_per_g:g} J/g")
+    if int(keep.sum()) < POINTS_LEAST:
+        raise InputError(f"{path}: {int(keep.sum())} usable points, at least 3 are needed")
+    _check(path, table, keep, power, fuel, lhv_j_per_g)
+    return EngineData(
+        power[keep],
+        fuel[keep],
+        None if speed is None else speed[keep],
+        None if torque is None else torque[keep],
+        tuple(remarks),
+    )
+
+
+def _quantities(table: DelimitedTable) -> dict[str, Floats]:
+    """Columns that are known, in SI units but for rpm and g."""
+    found: dict[str, Floats] = {}
+    titles: dict[str, str] = {}
+    for column in table.columns:
+        for quantity, names in _NAMES.items():
+            scale = _scale(table.path, column, quantity, names)
+            if scale is None:
+                continue
+            if quantity in found:
+                raise InputError(
+                    f"{table.path}: {quantity} is in two columns, {shown_value(titles[quantity])} "
+                    f"and {shown_value(column.title)}: leave one"
+                )
+            found[quantity], titles[quantity] = column.values * scale, column.title
+    return found
+
+
+def _scale(path: Path, column: Column, quantity: str, names: tuple[str, ...]) -> float | None:
+    """Size of the column's unit if it is of this quantity."""
+    units = _UNITS[quantity]
+    name, unit = column.name, column.unit
+    if not unit:
+        for suffix in sorted(filter(None, units), key=len, reverse=True):
+            if name == suffix:
+                name, unit = names[0], suffix
+            elif name.endswith(f"_{suffix}"):
+                name, unit = name.removesuffix(f"_{suffix}"), suffix
+            else:
+                continue
+            break
+    if name not in names:
+        return None
+    unit = re.sub(r"\s", "", unit)
+    if unit not in units:
+        known = ", ".join(filter(None, units)) or "none"
+        raise InputError(
+            f"{path}: {shown_value(column.title)}: unit {shown_value(unit)}, allowed: {known}"
+            if unit
+            else f"{path}: {shown_value(column.title)} names no unit, allowed: {known}"
+        )
+    return units[unit]
+
+
+def _fuel_column(path: Path, found: dict[str, Floats]) -> tuple[str, Floats]:
+    given = [how for how in ("fuel", "bsfc", "efficiency") if how in found]
+    if len(given) != 1:
+        raise InputError(
+            f"{path}: needs one column of fuel, has {' and '.join(given) or 'none'}: {ALLOWED}"
+        )
+    return given[0], found[given[0]]
+
+
+def _check(
+    path: Path,
+    table: DelimitedTable,
+    keep: NDArray[np.bool_],
+    power: Floats,
+    fuel: Floats,
+    lhv_j_per_g: float,
+) -> None:
+    """Refuse the first point that no engine has."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        efficiency = power / (fuel * lhv_j_per_g)
+    at = np.flatnonzero(keep & ((fuel <= 0.0) | (efficiency > EFFICIENCY_MAX)))
+    if not len(at):
+        return
+    k = at[0]
+    said = f"{path}, line {table.lines[k]}: fuel is {fuel[k]:.4g} g/s"
+    if fuel[k] <= 0.0:
+        raise InputError(f"{said}, must be more than 0")
+    raise InputError(
+        f"{said} at {power[k]:.4g} W, {efficiency[k]:.0%} efficient: at most {EFFICIENCY_MAX:.0%} "
+        "are possible, check the units"
+    )

@@ -1,0 +1,20 @@
+"""`qpmpc vehicle-from-map`."""
+
+import json
+
+from qpmpc.vehicle import load_vehicle
+
+
+def test_command(tmp_path, cli):
+    file, out = tmp_path / "engine.csv", tmp_path / "my-car.toml"
+    file.write_text("power_kw,efficiency\n2,0.2\n5,0.29\n10,0.35\n25,0.38\n50,0.37\n60,0.35\n")
+    done = cli("vehicle-from-map", file, "--out", out, "--json", tmp_path / "figures.json")
+    assert done.code == 0, done.err
+    assert "60.0 kW, best 38.0% at 25 kW" in done.out
+    figures = json.loads((tmp_path / "figures.json").read_text())
+    assert figures["vehicle"] == "my-car"
+    assert figures["points"] == 6
+    assert load_vehicle(out).name == "my-car"
+    assert out.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+    refused = cli("vehicle-from-map", file, "--out", tmp_path / "car.txt")
+    refused.assert_refused("--out", ".toml")
