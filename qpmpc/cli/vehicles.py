@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from qpmpc.report.table import ShownTable
     from qpmpc.vehicle import Vehicle
 
+SAID = 1e-3  # share of fuel that a curve is above its convex envelope, from which it is said
+
 
 def vehicles(
     name: Annotated[
@@ -41,6 +43,7 @@ def vehicles(
     from qpmpc.cli.console import result_console
     from qpmpc.cli.inputs import check_outputs
     from qpmpc.errors import InputError
+    from qpmpc.pwa.fit import non_convexity
     from qpmpc.report.pwa_curves import pwa_curves
     from qpmpc.report.write import write_pwa
     from qpmpc.vehicle import load_vehicle, vehicle_file_text
@@ -71,6 +74,12 @@ def vehicles(
     console.print(_parameters(vehicle))
     console.print("Piecewise-affine models of the controllers, with proven error bounds")
     console.print(_pwa(curves))
+    lost, at_w = non_convexity(curves[0].x, curves[0].y)
+    if lost > SAID:
+        console.print(
+            f"The fuel curve is not convex: up to {lost:.2%} above its convex envelope, which the "
+            f"model approximates, at {at_w / 1e3:.3g} kW"
+        )
     if out is not None:
         for remark in write_pwa(vehicle, curves, out):
             console.print(remark)

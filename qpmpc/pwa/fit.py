@@ -79,6 +79,13 @@ def convex_envelope(x: NDArray[np.float64], f: NDArray[np.float64]) -> NDArray[n
     return np.interp(x, x[hull], f[hull])
 
 
+def non_convexity(x: NDArray[np.float64], f: NDArray[np.float64]) -> tuple[float, float]:
+    """Largest distance of points above their convex envelope, as a share of f > 0, and its x."""
+    above = f / convex_envelope(x, f) - 1.0
+    at = int(above.argmax())
+    return float(max(above[at], 0.0)), float(x[at])
+
+
 def _tangent_pieces(
     x: NDArray[np.float64], f: NDArray[np.float64], band: NDArray[np.float64]
 ) -> tuple[list[float], list[float], list[float]]:

@@ -68,9 +68,9 @@ class EngineData:
 def read_engine_data(path: Path, lhv_j_per_g: float) -> EngineData:
     """Read a map (speed, torque, fuel) or a curve (power, fuel).
 
-    Fuel is a rate, a specific consumption or an efficiency: f = b P, or f = P / (eta LHV). Points
-    without power have neither of the last two, and are left out; points at which the engine is
-    dragged are too, and rows with an empty cell.
+    Fuel is a rate, or a specific consumption, f = b P, or an efficiency, f = P / (eta LHV): the
+    first of these that is there. Points without power have neither of the last two, and are left
+    out; points at which the engine is dragged are too, and rows with an empty cell.
 
     Parameters
     ----------
@@ -86,16 +86,21 @@ def read_engine_data(path: Path, lhv_j_per_g: float) -> EngineData:
     table = read_delimited(path, MEGABYTES_MAX)
     found = _quantities(table)
     remarks: list[str] = []
-    if "torque" in found and "speed" in found and "power" not in found:
-        speed, torque = found["speed"], found["torque"]
+    speed, torque = found.get("speed"), found.get("torque")
+    if speed is not None and torque is not None:
         power = torque * speed * (np.pi / 30.0)
-    elif "power" in found and "torque" not in found:
-        speed, torque, power = None, None, found["power"]
-        if "speed" in found:
-            speed = found["speed"]
+        if "power" in found:
+            remarks.append("power is that of torque and speed: its own column is not read")
+    elif torque is None and "power" in found:
+        power = found["power"]
     else:
         raise InputError(f"{path}: needs {ALLOWED}")
-    how, given = _fuel_column(path, found)
+    hows = [how for how in ("fuel", "bsfc", "efficiency") if how in found]
+    if not hows:
+        raise InputError(f"{path}: needs one column of fuel, has none: {ALLOWED}")
+    how, given = hows[0], found[hows[0]]
+    if hows[1:]:
+        remarks.append(f"{' and '.join(hows[1:])} not read, because {how} is there")
     drags, idles = power < 0.0, power == 0.0
     unknown = np.isnan(power) | np.isnan(given)
     if speed is not None:
@@ -169,15 +174,6 @@ def _scale(path: Path, column: Column, quantity: str, names: tuple[str, ...]) ->
             else f"{path}: {shown_value(column.title)} names no unit, allowed: {known}"
         )
     return units[unit]
-
-
-def _fuel_column(path: Path, found: dict[str, Floats]) -> tuple[str, Floats]:
-    given = [how for how in ("fuel", "bsfc", "efficiency") if how in found]
-    if len(given) != 1:
-        raise InputError(
-            f"{path}: needs one column of fuel, has {' and '.join(given) or 'none'}: {ALLOWED}"
-        )
-    return given[0], found[given[0]]
 
 
 def _check(

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from qpmpc.pwa.fit import convex_envelope
+from qpmpc.pwa.fit import non_convexity
 from qpmpc.settings import validated
 from qpmpc.shown import shown
 from qpmpc.vehicle.engine_map import EngineData, read_engine_data
@@ -104,7 +104,7 @@ def vehicle_from_map(path: Path, base: str, name: str) -> MappedVehicle:
     content = under.model_dump() | {"name": name, "description": described}
     content["engine"] |= changed
     vehicle = validated(Vehicle, content, f"{path}, as the engine of {base}")
-    lost, at_w = _non_convexity(line)
+    lost, at_w = non_convexity(line.power_w, line.fuel_g_per_s)
     remarks = [
         *line.remarks,
         f"of {under.name}: all but the engine's fuel and power; of its engine {KEPT}",
@@ -112,20 +112,18 @@ def vehicle_from_map(path: Path, base: str, name: str) -> MappedVehicle:
     if vehicle.engine.power_min_w != old.power_min_w:
         remarks.append(f"power_min_w is {vehicle.engine.power_min_w:g}, half of the rated power")
     return MappedVehicle(
-        vehicle, _toml(vehicle, base, path, line, data), data, line, lost, at_w, tuple(remarks)
+        vehicle,
+        _toml(vehicle, base, path, line, data),
+        data,
+        line,
+        100.0 * lost,
+        at_w,
+        tuple(remarks),
     )
 
 
 def _rounded(values: NDArray[np.float64], digits: int) -> tuple[float, ...]:
     return tuple(np.round(values, digits).tolist())
-
-
-def _non_convexity(line: OperatingLine) -> tuple[float, float]:
-    """Largest distance above the convex envelope, % of fuel, and the power of it."""
-    envelope = convex_envelope(line.power_w, line.fuel_g_per_s)
-    above = 100.0 * (line.fuel_g_per_s / envelope - 1.0)
-    at = int(above.argmax())
-    return float(max(above[at], 0.0)), float(line.power_w[at])
 
 
 def _toml(vehicle: Vehicle, base: str, path: Path, line: OperatingLine, data: EngineData) -> str:

@@ -50,8 +50,8 @@ def test_vehicles_name_shows_every_parameter_with_its_unit(cli):
     cells = [re.split(r"\s{2,}", line.strip()) for line in done.out.splitlines()]
     shown = {line[0]: line[1:] for line in cells}
     for section, values in vehicle.model_dump(exclude={"name", "description"}).items():
-        for key in values:
-            assert f"{section}.{key}" in shown
+        for key, value in values.items():
+            assert (f"{section}.{key}" in shown) == (value is not None)
     assert shown["thermal.t_amb_degc"] == ["-7", "°C"]
     assert shown["chassis.mass_kg"] == [f"{vehicle.chassis.mass_kg:g}", "kg"]
     assert shown["trip.soc_init"] == ["0.6"]

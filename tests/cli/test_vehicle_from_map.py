@@ -18,3 +18,17 @@ def test_command(tmp_path, cli):
     assert out.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
     refused = cli("vehicle-from-map", file, "--out", tmp_path / "car.txt")
     refused.assert_refused("--out", ".toml")
+
+
+def test_a_curve_that_is_not_convex_is_said_to_be(tmp_path, cli):
+    file, out = tmp_path / "engine.csv", tmp_path / "bent.toml"
+    file.write_text("power_kw,fuel_g_per_s\n0,0.1\n10,0.63\n20,1.1\n40,2.3\n")
+    made = cli("vehicle-from-map", file, "--out", out)
+    assert "up to 5 % of fuel below it, at 10 kW" in made.out
+    assert "not convex: up to 5.00% above its convex envelope" in " ".join(
+        cli("vehicles", out).out.split()
+    )
+    curve = tmp_path / "curve.csv"
+    curve.write_text("power_kw,fuel_g_per_s\n0,0.1\n10,0.6\n20,1.2\n40,2.6\n")
+    cli("vehicle-from-map", curve, "--out", out)
+    assert "not convex" not in cli("vehicles", out).out

@@ -163,7 +163,6 @@ def test_torque_limit_is_the_largest_at_each_speed():
     [
         ("speed,torque_nm,fuel_g_per_s\n1000,50,1\n", "'speed' names no unit, allowed: rpm"),
         ("speed_rpm,torque_nm\n1000,50\n", "one column of fuel, has none"),
-        ("speed_rpm,torque_nm,fuel_g_per_s,bsfc_g_per_kwh\n1000,50,1,250\n", "has fuel and bsfc"),
         ("speed_rpm,torque [ftlb],fuel_g_per_s\n1000,50,1\n", "unit 'ftlb', allowed: nm"),
         ("speed_rpm,torque_nm,rpm,fuel_g_per_s\n1000,50,1000,1\n", "speed is in two columns"),
         ("power_kw,efficiency\n5,0.2\n10,30\n20,35\n", "line 3: fuel is"),
@@ -183,6 +182,21 @@ def test_what_is_no_engine_is_one_line_that_names_it(text, said, tmp_path):
         vehicle_from_map(file, "prius-nimh", "mine")
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_of_two_columns_that_say_the_same_one_is_read_and_the_other_named(tmp_path):
+    file = tmp_path / "engine.csv"
+    file.write_text(
+        "speed_rpm,torque_nm,power_kw,fuel_g_per_s,bsfc_g_per_kwh\n"
+        "1000,50,9,0.4,1\n1000,100,9,0.8,1\n2000,50,9,0.9,1\n2000,100,9,1.6,1\n"
+    )
+    data = read_engine_data(file, LHV)
+    assert data.fuel_g_per_s.tolist() == [0.4, 0.8, 0.9, 1.6]
+    assert data.power_w[0] == pytest.approx(power_w(1000, 50))
+    assert data.remarks == (
+        "power is that of torque and speed: its own column is not read",
+        "bsfc not read, because fuel is there",
+    )
 
 
 def test_points_that_mean_nothing_are_left_out_and_counted(tmp_path):
