@@ -104,12 +104,13 @@ def test_unique_solution_is_found(name: str, recordings: list[Recording]) -> Non
 def test_osqp_converges_to_the_same_optimum(recordings: list[Recording]) -> None:
     for recording in recordings:
         reference = make_solver("piqp", 1e-11)
-        # from nothing: 40,000 iterations leave the highway's departure at 1.5e-3, these at 3e-4
+        # from nothing: 40,000 iterations leave the highway's departure at 1.5e-3, these at 3e-4;
+        # each takes seconds, so three of the QPs are enough
         departing = Osqp(AdmmSettings(cold_iterations=80_000))
         driving = Osqp(AdmmSettings(cold_iterations=40_000))
         for backend in (reference, departing, driving):
             backend.setup(recording.structure, recording.solves[0].data)
-        for qp in chosen(recording):
+        for qp in chosen(recording)[::2]:
             best = objective(qp.data, reference.solve(qp.data, None, None).primal)
             solver = departing if qp is recording.solves[0] else driving
             found = solver.solve(qp.data, qp.primal, qp.dual, cold=True)
@@ -179,12 +180,13 @@ def test_update_equals_new_setup(name: str, recordings: list[Recording]) -> None
     solver = make_solver(name, TOLERANCE)
     solver.setup(structure, first)
     solver.solve(first, None, None)
-    for data in (
-        second,
+    changes = [
         replace(second, lower=fixed[0], upper=fixed[1]),
         replace(second, upper=open_end),
+        second,
         first,
-    ):
+    ]
+    for data in changes[:2] if name == "proxqp" else changes:  # which takes seconds for each
         fresh = make_solver(name, TOLERANCE)
         fresh.setup(structure, data)
         a, b = solver.solve(data, None, None), fresh.solve(data, None, None)
