@@ -2,7 +2,6 @@
 
 import csv
 import io
-import re
 from array import array
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from qpmpc.cycles.cycle import Cycle, Floats
+from qpmpc.cycles.log_columns import is_log, parse_log
 from qpmpc.cycles.plausibility import check_motion, check_road, check_samples
 from qpmpc.cycles.suspicion import suspicions
 from qpmpc.errors import InputError
@@ -20,30 +20,31 @@ from qpmpc.remarks import say_once
 MEGABYTES_MAX = 64
 """24 h at 25 samples a second."""
 
+NOISE_MPS = 0.05
+"""Of a speed sensor while the car stands."""
+
+AGAIN_MAX = 0.05
+"""Share of rows that may repeat the time of the row before, as where a logger hiccups."""
+
 REQUIRED = ("time_s", "speed_mps")
 OPTIONAL = ("grade",)
 ALLOWED_TEXT = "time_s,speed_mps[,grade]"
 
-# Columns in a wrong unit: the pattern of their names, the conversion, and the right column.
-CONVERSIONS = (
-    (re.compile(r"km/?h|kph|kmph", re.I), "divide km/h by 3.6", "speed_mps"),
-    (re.compile(r"mph|mi/h", re.I), "multiply mph by 0.44704", "speed_mps"),
-    (re.compile(r"knot|kts?$", re.I), "multiply knots by 0.514444", "speed_mps"),
-    (re.compile(r"grade.*(%|percent|pct)", re.I), "divide percent by 100", "grade"),
-    (re.compile(r"time.*(_ms|\[ms|\(ms|milli)", re.I), "divide ms by 1000", "time_s"),
-)
-
 
 def read_csv(path: Path, *, name: str | None = None) -> Cycle:
-    """Read ``time_s,speed_mps[,grade]`` and interpolate it linearly at whole seconds.
+    """Read a drive and interpolate it linearly at whole seconds.
 
-    Columns may come in any order, time steps may be uneven, time may start anywhere. A byte order
-    mark, Windows line ends, spaces around names and blank lines at the end do not matter.
+    The columns are ``time_s,speed_mps[,grade]``, or those of a log with units of its own
+    (`qpmpc.cycles.log_columns`); what was assumed and left out then becomes a remark. Columns may
+    come in any order, time steps may be uneven, time may start anywhere. A byte order mark, Windows
+    line ends, spaces around names and blank lines at the end do not matter. Speeds down to -0.05
+    m/s are those of a standing car; a few rows with the time of the row before are left out.
 
     Parameters
     ----------
     path
-        UTF-8 text, values separated by commas: time in s, speed in m/s, grade as rise over run.
+        UTF-8 text: time in s, speed in m/s, grade as rise over run, unless the columns say other
+        units.
     name
         Name of the cycle; the stem of the file if absent.
 
@@ -56,18 +57,69 @@ def read_csv(path: Path, *, name: str | None = None) -> Cycle:
         speeds in km/h or mph are given as m/s (see `qpmpc.cycles.plausibility`). What is possible
         but unusual becomes a remark of the cycle (see `qpmpc.cycles.suspicion`).
     """
-    lines, table = _table(path, read_text(path, MEGABYTES_MAX))
-    time, speed = table["time_s"], table["speed_mps"]
-    grade = table.get("grade", np.zeros(len(time)))
-
+    text = read_text(path, MEGABYTES_MAX)
+    lines: Sequence[int]
+    said: list[str] = []
+    if is_log(text) and not _is_plain(text):
+        log = parse_log(path, text)
+        lines, time, speed, grade = log.lines, log.time_s, log.speed_mps, log.grade
+        said += log.remarks
+    else:
+        lines, table = _table(path, text)
+        time, speed = table["time_s"], table["speed_mps"]
+        grade = table.get("grade", np.zeros(len(time)))
+    lines, time, speed, grade = _repaired(path, lines, time, speed, grade, said)
     check_samples(path, lines, time, speed, grade)
     cycle = Cycle.from_samples(name if name is not None else path.stem, time, speed, grade)
     check_motion(path, lines, time, cycle)
     check_road(path, cycle)
-    remarks = tuple(f"{path}: {remark}" for remark in suspicions(cycle))
+    remarks = tuple(f"{path}: {remark}" for remark in (*said, *suspicions(cycle)))
     for remark in remarks:
         say_once(remark)
     return replace(cycle, remarks=remarks)
+
+
+def _is_plain(text: str) -> bool:
+    """Whether it is a table of the columns of `ALLOWED_TEXT`, whose rows begin with a number."""
+    first, _, rest = text.lstrip().partition("\n")
+    titles = [title.strip().strip('"') for title in first.split(",")]
+    cells = rest.lstrip().partition("\n")[0].split(",")
+    if set(titles) - set(REQUIRED + OPTIONAL) or len(cells) != len(titles):
+        return False
+    try:
+        float(cells[titles.index("time_s")])
+    except ValueError:
+        return False
+    return True
+
+
+def _repaired(
+    path: Path,
+    lines: Sequence[int],
+    time_s: Floats,
+    speed_mps: Floats,
+    grade: Floats,
+    said: list[str],
+) -> tuple[Sequence[int], Floats, Floats, Floats]:
+    """Take noise of a standing car for 0, and leave out rows whose time is that of the last."""
+    noise = (speed_mps < 0.0) & (speed_mps > -NOISE_MPS)
+    if np.any(noise):
+        said.append(f"{int(np.sum(noise))} speeds between -{NOISE_MPS:g} and 0 m/s taken for 0")
+        speed_mps = np.where(noise, 0.0, speed_mps)
+    again = np.append(False, np.diff(time_s) == 0.0)
+    if np.any(again):
+        share = float(np.mean(again))
+        if share > AGAIN_MAX:
+            line = lines[int(np.argmax(again))]
+            raise InputError(
+                f"{path}, line {line}: {share:.0%} of the rows have the time of the row before: "
+                "time must increase strictly; give it with decimals"
+            )
+        said.append(f"{int(np.sum(again))} rows with the time of the row before left out")
+        kept = np.flatnonzero(~again)
+        lines = [lines[k] for k in kept.tolist()]
+        time_s, speed_mps, grade = time_s[kept], speed_mps[kept], grade[kept]
+    return lines, time_s, speed_mps, grade
 
 
 def _table(path: Path, text: str) -> tuple[Sequence[int], dict[str, Floats]]:
@@ -106,17 +158,10 @@ def _columns(path: Path, header: list[str]) -> list[str]:
     found = ",".join(header)
     if len(found) > 80:
         found = found[:77] + "..."
-    message = f"{path}, line 1: columns found: {found!r}; allowed: {ALLOWED_TEXT}"
-    hints = [
-        f"{column!r}: {conversion} and name the column {target}"
-        for column in header
-        if column not in REQUIRED + OPTIONAL
-        for pattern, conversion, target in CONVERSIONS
-        if pattern.search(column)
-    ]
-    if len(header) == 1 and re.search(r"[;\t]", found):
-        hints = ["separate columns by commas"]
-    raise InputError("; ".join([message, *hints[:1]]))
+    raise InputError(
+        f"{path}, line 1: columns found: {found!r}; a time and a speed with units are needed, "
+        f"as in 'Time [s],Speed [km/h]'; allowed: {ALLOWED_TEXT}"
+    )
 
 
 def _numbers(path: Path, line: int, cells: list[str], columns: list[str]) -> list[float]:

@@ -1,4 +1,4 @@
-"""Tables of numbers in text files as people have them: separators, decimal commas, units."""
+"""Tables in text files as people have them: separators, decimal commas, titles, units."""
 
 import csv
 import io
@@ -15,7 +15,10 @@ from qpmpc.problems import shown_value
 
 SEPARATORS = (";", "\t", ",")
 COMMENT = "#"
-_UNIT_IN_NAME = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*$")
+_UNIT_IN_TITLE = (
+    re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*$"),  # Speed [km/h]
+    re.compile(r"^(?P<name>[^,]*),\s*(?P<unit>[^,]*)$"),  # Target Speed, mph
+)
 
 
 @dataclass(frozen=True)
@@ -25,74 +28,129 @@ class Column:
     Attributes
     ----------
     title : as written in the header
-    name : the title without a unit in brackets, in lower case, with `_` for spaces and hyphens
-    unit : from brackets in the title or from a row of units, in lower case; empty where neither is
-    values : shape (rows,); NaN where a cell is empty
+    name : the title without its unit, in lower case, `_` for all but letters and digits
+    unit : in brackets or after a comma in the title, or from a row of units, in lower case without
+        spaces; empty where neither is
+    cells : of each row, without spaces around
     """
 
     title: str
     name: str
     unit: str
-    values: NDArray[np.float64]
+    cells: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class DelimitedTable:
-    """A table of numbers with a header.
+    """A table with a header.
 
     Attributes
     ----------
     path : of the file
     columns : in the file's order
     lines : line of each row in the file
+    titles : how many lines above the header were left out
+    decimal_comma : whether a comma in a number is its decimal point
     """
 
     path: Path
     columns: tuple[Column, ...]
     lines: tuple[int, ...]
+    titles: int
+    decimal_comma: bool
+
+    def numbers(self, column: Column, absent: tuple[str, ...] = ("",)) -> NDArray[np.float64]:
+        """Convert a column; shape (rows,), NaN where a cell says that there is no number.
+
+        Raises
+        ------
+        InputError
+            At the first cell that is neither a finite number nor one of `absent`.
+        """
+        found = np.full(len(self.lines), np.nan)
+        for k, cell in enumerate(column.cells):
+            if cell.lower() in absent:
+                continue
+            value = self.number(cell)
+            if value is None:
+                raise InputError(
+                    f"{self.path}, line {self.lines[k]}: {shown_value(column.title)} is "
+                    f"{shown_value(cell)}, must be a finite number or empty"
+                )
+            found[k] = value
+        return found
+
+    def number(self, cell: str) -> float | None:
+        """Convert a cell; None if it is no finite number."""
+        return _number(cell, self.decimal_comma)
 
 
 def read_delimited(path: Path, megabytes: int) -> DelimitedTable:
-    """Read a table of numbers: a header, maybe a row of units, and rows.
+    """Read a table from a file; see `parse_delimited`."""
+    return parse_delimited(path, read_text(path, megabytes))
 
-    Values are separated by semicolons, tabs or commas, whichever the header has first in that
-    order; with semicolons or tabs a decimal comma is one. Lines that begin with # and blank lines
-    do not count. An empty cell is no number.
+
+def header_names(text: str) -> list[str]:
+    """Names of the columns, as `Column.name`; empty where there is no header with rows below."""
+    lines, _ = _table_lines(text)
+    if len(lines) < 2:
+        return []
+    return [_named(cell.strip().strip('"'))[0] for cell in lines[0][1].split(_separator(lines))]
+
+
+def parse_delimited(path: Path, text: str) -> DelimitedTable:
+    """Parse a table: lines of title, a header, maybe a row of units, and rows.
+
+    The header is the first line with two cells or more. They are separated by semicolons, tabs or
+    commas, whichever it has first in that order; with semicolons or tabs a decimal comma is one.
+    Lines that begin with # and blank lines do not count.
 
     Raises
     ------
     InputError
         One line that names the file, the line and what is allowed.
     """
-    lines = [
-        (number, text)
-        for number, text in enumerate(read_text(path, megabytes).splitlines(), start=1)
-        if text.strip(" \t;,") and not text.lstrip().startswith(COMMENT)
-    ]
+    lines, titles = _table_lines(text)
     if len(lines) < 2:
         raise InputError(f"{path}: needs a header and at least one row below it")
-    separator = next((s for s in SEPARATORS if s in lines[0][1]), ",")
-    rows = [(number, _cells(path, number, text, separator)) for number, text in lines]
+    separator = _separator(lines)
+    rows = [(number, _cells(path, number, line, separator)) for number, line in lines]
     header = rows[0][1]
     if len(header) != len(set(header)) or not all(header):
         raise InputError(f"{path}, line {rows[0][0]}: each column needs a name of its own")
-    titles = [_named(title) for title in header]
+    named = [_named(title) for title in header]
+    decimal_comma = separator != ","
     units = rows[1][1]
-    if len(units) == len(header) and not any(map(_is_number, units)):
-        titles = [
-            (name, inside or below.strip("[]()").lower())
-            for (name, inside), below in zip(titles, units, strict=True)
+    if len(units) == len(header) and all(_is_unit(cell, decimal_comma) for cell in units):
+        named = [
+            (name, inside or _plain_unit(below.strip("[]()")))
+            for (name, inside), below in zip(named, units, strict=True)
         ]
         rows = rows[1:]
     rows = rows[1:]
     if not rows:
         raise InputError(f"{path}: no rows below the header")
-    values = np.array([_numbers(path, number, cells, header, separator) for number, cells in rows])
+    cells = [_of_width(path, number, row, len(header)) for number, row in rows]
     columns = tuple(
-        Column(title, name, unit, values[:, k])
-        for k, (title, (name, unit)) in enumerate(zip(header, titles, strict=True))
+        Column(title, name, unit, tuple(row[k] for row in cells))
+        for k, (title, (name, unit)) in enumerate(zip(header, named, strict=True))
     )
-    return DelimitedTable(path, columns, tuple(number for number, _ in rows))
+    return DelimitedTable(path, columns, tuple(number for number, _ in rows), titles, decimal_comma)
+
+
+def _table_lines(text: str) -> tuple[list[tuple[int, str]], int]:
+    """Lines from the header on, with their numbers, and how many of title are above it."""
+    lines = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), start=1)
+        if line.strip(" \t;,") and not line.lstrip().startswith(COMMENT)
+    ]
+    first = next((k for k, (_, line) in enumerate(lines) if any(s in line for s in SEPARATORS)), 0)
+    return lines[first:], first
+
+
+def _separator(lines: list[tuple[int, str]]) -> str:
+    return next((s for s in SEPARATORS if s in lines[0][1]), ",")
 
 
 def _cells(path: Path, number: int, text: str, separator: str) -> list[str]:
@@ -102,40 +160,36 @@ def _cells(path: Path, number: int, text: str, separator: str) -> list[str]:
         raise InputError(f"{path}, line {number}: not a row of a table") from None
 
 
-def _named(title: str) -> tuple[str, str]:
-    found = _UNIT_IN_NAME.match(title)
-    name, unit = (found["name"], found["unit"]) if found else (title, "")
-    return re.sub(r"[\s-]+", "_", name.strip()).lower(), unit.strip().lower()
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell.replace(",", "."))
-    except ValueError:
-        return False
-    return True
-
-
-def _numbers(
-    path: Path, number: int, cells: list[str], header: list[str], separator: str
-) -> list[float]:
-    if len(cells) > len(header) and not any(cells[len(header) :]):
-        cells = cells[: len(header)]
-    if len(cells) != len(header):
+def _of_width(path: Path, number: int, cells: list[str], width: int) -> list[str]:
+    if len(cells) > width and not any(cells[width:]):
+        cells = cells[:width]
+    if len(cells) != width:
         raise InputError(
-            f"{path}, line {number}: {len(cells)} values, but the header has {len(header)} columns"
+            f"{path}, line {number}: {len(cells)} values, but the header has {width} columns"
         )
-    found = []
-    for title, cell in zip(header, cells, strict=True):
-        text = cell.replace(",", ".") if separator != "," else cell
-        try:
-            value = float(text) if text else np.nan
-        except ValueError:
-            value = np.inf
-        if np.isinf(value) or (text and np.isnan(value)):
-            raise InputError(
-                f"{path}, line {number}: {shown_value(title)} is {shown_value(cell)}, must be a "
-                "finite number or empty"
-            )
-        found.append(value)
-    return found
+    return cells
+
+
+def _named(title: str) -> tuple[str, str]:
+    found = next((match for form in _UNIT_IN_TITLE if (match := form.match(title))), None)
+    name, unit = (found["name"], found["unit"]) if found else (title, "")
+    return re.sub(r"[^0-9a-z%/]+", "_", name.lower()).strip("_"), _plain_unit(unit)
+
+
+def _plain_unit(unit: str) -> str:
+    return re.sub(r"\s", "", unit).lower()
+
+
+def _is_unit(cell: str, decimal_comma: bool) -> bool:
+    """Whether a cell below the header may be a unit: short, and no number."""
+    return (
+        len(cell) <= 12 and _number(cell, decimal_comma) is None and not re.search(r"\d{2}", cell)
+    )
+
+
+def _number(cell: str, decimal_comma: bool) -> float | None:
+    try:
+        value = float(cell.replace(",", ".") if decimal_comma else cell)
+    except ValueError:
+        return None
+    return value if np.isfinite(value) else None

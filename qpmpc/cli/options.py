@@ -10,7 +10,7 @@ CycleArgument = Annotated[
     typer.Argument(
         metavar="CYCLE",
         help="A shipped cycle (see [b]qpmpc cycles[/b]), a trip (see [b]qpmpc trips[/b]) or a CSV "
-        "file with time_s,speed_mps[dim],grade[/dim].",
+        "file with time_s,speed_mps[dim],grade[/dim], or a log with units in its header.",
         show_default=False,
     ),
 ]

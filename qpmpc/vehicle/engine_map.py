@@ -146,7 +146,7 @@ def _quantities(table: DelimitedTable) -> dict[str, Floats]:
                     f"{table.path}: {quantity} is in two columns, {shown_value(titles[quantity])} "
                     f"and {shown_value(column.title)}: leave one"
                 )
-            found[quantity], titles[quantity] = column.values * scale, column.title
+            found[quantity], titles[quantity] = table.numbers(column) * scale, column.title
     return found
 
 
@@ -154,15 +154,14 @@ def _scale(path: Path, column: Column, quantity: str, names: tuple[str, ...]) ->
     """Size of the column's unit if it is of this quantity."""
     units = _UNITS[quantity]
     name, unit = column.name, column.unit
-    if not unit:
-        for suffix in sorted(filter(None, units), key=len, reverse=True):
-            if name == suffix:
-                name, unit = names[0], suffix
-            elif name.endswith(f"_{suffix}"):
-                name, unit = name.removesuffix(f"_{suffix}"), suffix
-            else:
-                continue
-            break
+    for suffix in sorted(filter(None, units), key=len, reverse=True):
+        if name == suffix:
+            name, unit = names[0], unit or suffix
+        elif name.endswith(f"_{suffix}"):
+            name, unit = name.removesuffix(f"_{suffix}"), unit or suffix
+        else:
+            continue
+        break
     if name not in names:
         return None
     unit = re.sub(r"\s", "", unit)

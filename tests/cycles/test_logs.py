@@ -1,0 +1,120 @@
+"""Logs and schedules as people have them: the same drive under other names and units."""
+
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from qpmpc.cycles import load_cycle
+from qpmpc.errors import InputError
+
+SPEED_MPS = [0, 0, 1.5, 4, 7, 9, 10, 10, 9.5, 8, 8, 8, 6, 3, 1, 0, 0]
+PARTS = ["time_s", "speed [km/h]", ",", ";", "\t", "\n", "1", "-", '"', "é"]
+BEGIN = datetime(2026, 1, 31, 23, 59, 55, tzinfo=UTC)
+
+
+def rows(row: Callable[[int, float], str]) -> str:
+    return "".join(f"{row(k, v)}\n" for k, v in enumerate(SPEED_MPS))
+
+
+FILES = {
+    "units in brackets": "Time [s],Vehicle Speed (km/h)\n" + rows(lambda k, v: f"{k},{v * 3.6!r}"),
+    "units in a row": "time_s,speed_mps\ns,m/s\n" + rows(lambda k, v: f"{k},{v}"),
+    "units in the name": "time_ms,speed_mph\n" + rows(lambda k, v: f"{1000 * k},{v / 0.44704!r}"),
+    "semicolons and decimal commas": "t_s;v_kmh\n"
+    + rows(lambda k, v: f"{k},0;{v * 3.6!r}".replace(".", ",")),
+    "comments and blank lines": "# logger\n\ntime_s,speed_mps\n# go\n"
+    + rows(lambda k, v: f"{k},{v}"),
+    "a schedule of the EPA": "Sample Schedule\nTest Time, secs\tTarget Speed, mph\n"
+    + rows(lambda k, v: f"{k}\t{v / 0.44704!r}"),
+    "FASTSim 2": "cycSecs,cycMps,cycGrade,cycRoadType\n" + rows(lambda k, v: f"{k},{v},0,0"),
+    "FASTSim 3": "time_seconds,speed_meters_per_second,grade,road_type\n"
+    + rows(lambda k, v: f"{k},{v},0,0"),
+    "ISO dates": "time_s,speed_mps\n"
+    + rows(lambda k, v: f"{(BEGIN + timedelta(seconds=k)).isoformat()},{v}"),
+    "an OBD logger": "GPS Time,Device Time,Speed (OBD)(km/h)\n"
+    + rows(
+        lambda k, v: f"x,{BEGIN + timedelta(seconds=k):%d-%b-%Y %H:%M:%S}.120,"
+        + ("-" if k in (5, 9) else repr(v * 3.6))
+    ),
+    "10 Hz": "time_s;speed_mps\n"
+    + "".join(f"{k / 10};{float(np.interp(k / 10, range(17), SPEED_MPS))!r}\n" for k in range(161)),
+    "noise while standing": "time_s,speed_mps\n"
+    + rows(lambda k, v: f"{k},{v if v else -0.01}"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_read(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "log.txt"
+    path.write_text(FILES[name])
+    cycle = load_cycle(path)
+    expected = np.array(SPEED_MPS, dtype=float)
+    if name == "an OBD logger":  # two rows without a value: between their neighbours
+        expected[[5, 9]] = 0.5 * (expected[[4, 8]] + expected[[6, 10]])
+    np.testing.assert_allclose(cycle.speed_mps, expected, atol=1e-9)
+
+
+def test_what_was_assumed_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(FILES["an OBD logger"])
+    assert [remark.removeprefix(f"{path}: ") for remark in load_cycle(path).remarks[:4]] == [
+        "time from 'Device Time', as dates",
+        "speed from 'Speed (OBD)(km/h)', in km/h",
+        "not read: 'GPS Time'",
+        "2 of 17 rows without a value left out",
+    ]
+    path.write_text("time_s,speed_mps\n" + rows(lambda k, v: f"{k},{v}"))
+    assert not load_cycle(path).remarks
+
+
+def test_a_stamp_that_is_there_twice_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    text = "time_s,speed_mps\n" + "".join(f"{k},{v}\n" for k, v in enumerate(2 * SPEED_MPS))
+    path.write_text(text.replace("\n4,7\n", "\n4,7\n4,7\n"))
+    cycle = load_cycle(path)
+    np.testing.assert_array_equal(cycle.speed_mps, 2 * SPEED_MPS)
+    assert "1 rows with the time of the row before left out" in cycle.remarks[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("time,speed_mps\n0,0\n1,1\n2,2\n3,3\n", "'time' names no unit: add one of s, "),
+        ("time_s,speed\n0,0\n1,1\n2,2\n3,3\n4,4\n", "'speed' names no unit: add one of m/s, "),
+        ("time_s,speed [furlong]\n0,0\n1,1\n2,2\n3,3\n", "unit 'furlong', allowed: m/s"),
+        ("time_s,speed_kmh,gps_speed_kmh\n0,0,0\n1,1,1\n", "speed is in two columns"),
+        ("time_s,speed_kmh\n0,0\n1,x\n2,2\n3,3\n", "line 3: 'speed_kmh' is 'x'"),
+        ("time_s;speed_kmh\n0;0\n1\n2;2\n3;3\n", "line 3: 1 values"),
+        ("time,speed_kmh\n2026-01-01T00:00:00,0\nlater,1\n", "line 3: 'time' is 'later', must be"),
+        ("time_s,speed_kmh\n0,0\n0,0\n0,0\n1,1\n1,1\n2,2\n", "50% of the rows have the time"),
+        ("time_s,speed_kmh\n0,-\n1,-\n2,3\n", "1 row(s) with values"),
+        ("time_s,speed_kmh\n0,0\n1,-9\n2,3\n3,0\n", "must not be negative"),
+    ],
+)
+def test_what_cannot_be_known_is_asked_for(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        load_cycle(path)
+    assert said in str(caught.value)
+    assert "log.csv" in str(caught.value)
+    assert str(caught.value).isprintable()
+    assert len(str(caught.value)) < 400
+
+
+@settings(max_examples=200, deadline=None)
+@given(text=st.text(max_size=200) | st.lists(st.sampled_from(PARTS), max_size=40).map("".join))
+def test_any_text_is_read_or_refused_in_one_line(text: str, tmp_path_factory) -> None:
+    path = tmp_path_factory.getbasetemp() / "any.csv"
+    path.write_text(text, "utf-8", errors="replace")
+    said = ""
+    try:
+        load_cycle(path)
+    except InputError as error:
+        said = str(error)
+    assert said.isprintable()
