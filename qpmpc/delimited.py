@@ -16,7 +16,8 @@ from qpmpc.problems import shown_value
 SEPARATORS = (";", "\t", ",")
 COMMENT = "#"
 _UNIT_IN_TITLE = (
-    re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*$"),  # Speed [km/h]
+    re.compile(r"^(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*$"),  # BSFC [g/(kWh)]
+    re.compile(r"^(?P<name>.*?)\s*\((?P<unit>[^()]*)\)\s*$"),  # Speed (OBD)(km/h)
     re.compile(r"^(?P<name>[^,]*),\s*(?P<unit>[^,]*)$"),  # Target Speed, mph
 )
 
@@ -116,6 +117,8 @@ def parse_delimited(path: Path, text: str) -> DelimitedTable:
     separator = _separator(lines)
     rows = [(number, _cells(path, number, line, separator)) for number, line in lines]
     header = rows[0][1]
+    while header and not header[-1]:
+        header.pop()
     if len(header) != len(set(header)) or not all(header):
         raise InputError(f"{path}, line {rows[0][0]}: each column needs a name of its own")
     named = [_named(title) for title in header]
@@ -177,7 +180,7 @@ def _named(title: str) -> tuple[str, str]:
 
 
 def _plain_unit(unit: str) -> str:
-    return re.sub(r"\s", "", unit).lower()
+    return re.sub(r"[\s()]", "", unit).replace("·", "*").lower()
 
 
 def _is_unit(cell: str, decimal_comma: bool) -> bool:

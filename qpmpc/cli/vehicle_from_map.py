@@ -7,6 +7,8 @@ import typer
 
 from qpmpc.cli.options import JsonOption
 
+DOUBTFUL = 0.15  # best efficiency below which a unit is probably wrong
+
 
 def vehicle_from_map(
     engine: Annotated[
@@ -50,9 +52,10 @@ def vehicle_from_map(
       qpmpc compare nycc --vehicle my_car.toml
     """
     from qpmpc.cli.console import result_console, write_json
-    from qpmpc.cli.inputs import check_outputs
+    from qpmpc.cli.inputs import STDOUT, check_outputs
     from qpmpc.errors import InputError
     from qpmpc.files import check_file, write_text
+    from qpmpc.pwa.fit import non_convexity
     from qpmpc.report.pwa_curves import pwa_curves
     from qpmpc.report.write import write_engine
     from qpmpc.vehicle.from_map import vehicle_from_map as made
@@ -60,7 +63,16 @@ def vehicle_from_map(
     if out.suffix != ".toml":
         raise InputError(f"--out {out}: a vehicle file ends in .toml")
     check_outputs(json_file, None)
+    picture = out.with_suffix(".png")
     check_file(out, "--out")
+    check_file(picture, "--out")
+    files = [engine, out, picture, *([json_file] if json_file not in (None, STDOUT) else [])]
+    files += [Path(base)] if base.endswith(".toml") else []
+    if len({file.resolve() for file in files}) < len(files):
+        raise InputError(
+            "MAP.csv, --base, --out, its picture and --json must be files of their own: "
+            f"{', '.join(str(file) for file in files)}"
+        )
     mapped = made(engine, base, out.stem if name is None else name)
     fuel = pwa_curves(mapped.vehicle)[0]
     write_text(out, mapped.toml)
@@ -74,19 +86,26 @@ def vehicle_from_map(
         f"controllers' model: {fuel.fit.pieces} pieces, at most {fuel.fit.below:.2g} g/s below and "
         f"{fuel.fit.above:.2g} above the line"
     )
-    if mapped.non_convex_percent > 0.0:
+    lost, at_w = non_convexity(fuel.x, fuel.y)
+    if lost > 0.0:
         console.print(
-            "the line is not convex: the convex model is up to "
-            f"{mapped.non_convex_percent:.2g} % of fuel below it, at "
-            f"{mapped.non_convex_at_w / 1e3:.3g} kW"
+            f"the line is not convex: the convex model is up to {100.0 * lost:.2g} % of fuel below "
+            f"it, at {at_w / 1e3:.3g} kW"
+        )
+    if mapped.best_efficiency < DOUBTFUL:
+        console.print(
+            f"remark: at best {mapped.best_efficiency:.1%} efficient, less than engines are: are "
+            "the units right?"
         )
     for remark in mapped.remarks:
         console.print(f"remark: {remark}")
-    for said in [*write_engine(mapped, fuel, out.with_suffix(".png")), f"{out} written"]:
+    for said in [*write_engine(mapped, fuel, picture), f"{out} written"]:
         console.print(said)
     model = {
         "pwa_pieces": fuel.fit.pieces,
         "pwa_below_g_per_s": fuel.fit.below,
         "pwa_above_g_per_s": fuel.fit.above,
+        "non_convex_percent": 100.0 * lost,
+        "non_convex_at_w": at_w,
     }
     write_json(mapped.summary() | model, json_file)

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from qpmpc.report.pwa_curves import PwaCurve
 from qpmpc.report.style import BLUE, GREY, LIMIT, VERMILION, png, tidy
 from qpmpc.vehicle.from_map import MappedVehicle
-from qpmpc.vehicle.operating_line import torque_limit
+from qpmpc.vehicle.operating_line import torque_range
 
 
 def draw_engine(mapped: MappedVehicle, fuel: PwaCurve) -> bytes:
@@ -54,7 +54,8 @@ def _points(axes: Axes, mapped: MappedVehicle) -> None:
     else:
         drawn = axes.scatter(data.speed_rpm, data.torque_nm, c=percent, s=14, cmap="viridis")
         axes.figure.colorbar(drawn, ax=axes, label="efficiency %")
-        axes.plot(*torque_limit(data.speed_rpm, data.torque_nm), label="torque limit", **LIMIT)
+        speeds, _, most_nm = torque_range(data.speed_rpm, data.torque_nm)
+        axes.plot(speeds, most_nm, label="torque limit", **LIMIT)
         with np.errstate(divide="ignore", invalid="ignore"):
             torque = line.power_w / (line.speed_rpm * (np.pi / 30.0))
         axes.plot(line.speed_rpm, torque, color=VERMILION, linewidth=1.6, label="optimal line")

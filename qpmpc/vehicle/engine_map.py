@@ -25,12 +25,27 @@ _FUEL = ("fuel", "fuel_rate", "fuel_flow", "fuel_mass_flow", "consumption")
 _BSFC = ("bsfc", "be", "specific_consumption", "sfc")
 _EFFICIENCY = ("efficiency", "eta", "eff")
 _UNITS: dict[str, dict[str, float]] = {
-    "speed": {"rpm": 1.0, "1/min": 1.0, "rad/s": 30.0 / np.pi, "rad_per_s": 30.0 / np.pi},
+    "speed": {
+        "rpm": 1.0,
+        "1/min": 1.0,
+        "min-1": 1.0,
+        "rad/s": 30.0 / np.pi,
+        "rad_per_s": 30.0 / np.pi,
+    },
     "torque": {"nm": 1.0, "n_m": 1.0, "n*m": 1.0},
     "power": {"w": 1.0, "kw": 1e3},
     "fuel": {"g/s": 1.0, "g_per_s": 1.0, "kg/h": 1.0 / 3.6, "kg_per_h": 1.0 / 3.6, "kg/s": 1e3},
-    "bsfc": {"g/kwh": 1.0 / 3.6e6, "g_per_kwh": 1.0 / 3.6e6},
+    "bsfc": {"g/kwh": 1.0 / 3.6e6, "g_per_kwh": 1.0 / 3.6e6, "g/kw-h": 1.0 / 3.6e6},
     "efficiency": {"": 1.0, "-": 1.0, "1": 1.0, "%": 1e-2, "percent": 1e-2},
+}
+# Largest of any engine: more is a wrong unit.
+_MOST = {
+    "speed": 30e3,
+    "torque": 20e3,
+    "power": 1e6,
+    "fuel": 1e3,
+    "bsfc": 1.0 / 36.0,
+    "efficiency": 1e3,
 }
 _NAMES = {
     "speed": _SPEED,
@@ -84,40 +99,46 @@ def read_engine_data(path: Path, lhv_j_per_g: float) -> EngineData:
         what no engine does.
     """
     table = read_delimited(path, MEGABYTES_MAX)
-    found = _quantities(table)
+    found, wrong = _quantities(table)
     remarks: list[str] = []
     speed, torque = found.get("speed"), found.get("torque")
     if speed is not None and torque is not None:
         power = torque * speed * (np.pi / 30.0)
+        drags, standing = torque < 0.0, speed <= 0.0
         if "power" in found:
             remarks.append("power is that of torque and speed: its own column is not read")
     elif torque is None and "power" in found:
         power = found["power"]
+        drags, standing = power < 0.0, np.zeros(len(power), dtype=bool)
     else:
-        raise InputError(f"{path}: needs {ALLOWED}")
+        raise wrong or InputError(f"{path}: needs {ALLOWED}")
     hows = [how for how in ("fuel", "bsfc", "efficiency") if how in found]
     if not hows:
-        raise InputError(f"{path}: needs one column of fuel, has none: {ALLOWED}")
+        raise wrong or InputError(f"{path}: needs one column of fuel, has none: {ALLOWED}")
     how, given = hows[0], found[hows[0]]
     if hows[1:]:
         remarks.append(f"{' and '.join(hows[1:])} not read, because {how} is there")
-    drags, idles = power < 0.0, power == 0.0
     unknown = np.isnan(power) | np.isnan(given)
     if speed is not None:
         unknown |= np.isnan(speed)
-    keep = ~(unknown | drags) if how == "fuel" else ~(unknown | drags | idles | (given <= 0.0))
-    with np.errstate(divide="ignore", invalid="ignore"):
+    without = (given == 0.0) | ((power == 0.0) & (how != "fuel"))
+    left = np.zeros(len(power), dtype=bool)
+    for rows, what in (
+        (unknown, "with an empty cell"),
+        (standing, "at speed 0 or below"),
+        (drags, "at which the engine is dragged"),
+        (without, "without fuel" if how == "fuel" else f"without power or {how}"),
+    ):
+        count = int((rows & ~left).sum())
+        left |= rows
+        if count:
+            remarks.append(f"{count} of {len(power)} points {what} left out")
+    keep = ~left
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         if how == "fuel":
             fuel = given
         else:
             fuel = given * power if how == "bsfc" else power / (given * lhv_j_per_g)
-    for count, what in (
-        (int(unknown.sum()), "with an empty cell"),
-        (int((drags & ~unknown).sum()), "at which the engine is dragged"),
-        (int((~keep & ~unknown & ~drags).sum()), f"without power or {how}"),
-    ):
-        if count:
-            remarks.append(f"{count} of {len(power)} points {what} left out")
     if how == "efficiency":
         remarks.append(f"efficiency counted with the base's heating value, {lhv_j_per_g:g} J/g")
     if int(keep.sum()) < POINTS_LEAST:
@@ -132,13 +153,18 @@ def read_engine_data(path: Path, lhv_j_per_g: float) -> EngineData:
     )
 
 
-def _quantities(table: DelimitedTable) -> dict[str, Floats]:
-    """Columns that are known, in SI units but for rpm and g."""
+def _quantities(table: DelimitedTable) -> tuple[dict[str, Floats], InputError | None]:
+    """Columns that are known, in SI units but for rpm and g; what is wrong with another."""
     found: dict[str, Floats] = {}
     titles: dict[str, str] = {}
+    wrong: InputError | None = None
     for column in table.columns:
         for quantity, names in _NAMES.items():
-            scale = _scale(table.path, column, quantity, names)
+            try:
+                scale = _scale(table.path, column, quantity, names)
+            except InputError as error:
+                wrong = wrong or error
+                continue
             if scale is None:
                 continue
             if quantity in found:
@@ -146,8 +172,15 @@ def _quantities(table: DelimitedTable) -> dict[str, Floats]:
                     f"{table.path}: {quantity} is in two columns, {shown_value(titles[quantity])} "
                     f"and {shown_value(column.title)}: leave one"
                 )
-            found[quantity], titles[quantity] = table.numbers(column) * scale, column.title
-    return found
+            values = table.numbers(column) * scale
+            high = np.flatnonzero(np.abs(values) > _MOST[quantity])
+            if len(high):
+                raise InputError(
+                    f"{table.path}, line {table.lines[high[0]]}: {shown_value(column.title)} is "
+                    f"{shown_value(column.cells[high[0]])}, more than any engine has: its unit?"
+                )
+            found[quantity], titles[quantity] = values, column.title
+    return found, wrong
 
 
 def _scale(path: Path, column: Column, quantity: str, names: tuple[str, ...]) -> float | None:
@@ -184,9 +217,11 @@ def _check(
     lhv_j_per_g: float,
 ) -> None:
     """Refuse the first point that no engine has."""
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         efficiency = power / (fuel * lhv_j_per_g)
-    at = np.flatnonzero(keep & ((fuel <= 0.0) | (efficiency > EFFICIENCY_MAX)))
+    at = np.flatnonzero(
+        keep & ((fuel <= 0.0) | (efficiency > EFFICIENCY_MAX) | (fuel > _MOST["fuel"]))
+    )
     if not len(at):
         return
     k = at[0]

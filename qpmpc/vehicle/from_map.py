@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from qpmpc.pwa.fit import non_convexity
 from qpmpc.settings import validated
 from qpmpc.shown import shown
 from qpmpc.vehicle.engine_map import EngineData, read_engine_data
@@ -27,8 +26,6 @@ class MappedVehicle:
     ----------
     vehicle, toml : parameters, and their file
     data, line : the points read, and the line made of them
-    non_convex_percent, non_convex_at_w : how far at most the line is above its convex envelope,
-        on which the QP's model of it lies, in % of fuel, and at which power
     remarks : what was assumed, left out and kept, a line each
     """
 
@@ -36,8 +33,6 @@ class MappedVehicle:
     toml: str
     data: EngineData
     line: OperatingLine
-    non_convex_percent: float
-    non_convex_at_w: float
     remarks: tuple[str, ...]
 
     @property
@@ -63,8 +58,6 @@ class MappedVehicle:
             "idle_fuel_g_per_s": float(self.line.fuel_g_per_s[0]),
             "best_efficiency": self.best_efficiency,
             "best_efficiency_power_w": self.best_power_w,
-            "non_convex_percent": self.non_convex_percent,
-            "non_convex_at_w": self.non_convex_at_w,
             "remarks": list(self.remarks),
         }
 
@@ -87,15 +80,17 @@ def vehicle_from_map(path: Path, base: str, name: str) -> MappedVehicle:
         If a file cannot be read, or if what they make is not an engine.
     """
     under = load_vehicle(base)
+    validated(Vehicle, under.model_dump() | {"name": name}, "--name, or the name of --out")
     data = read_engine_data(path, under.engine.lhv_j_per_g)
     line = operating_line(path, data)
     power_max_w = float(math.floor(line.power_w[-1]))
     old = under.engine
+    ramp_w_per_s = round(min(old.ramp_w_per_s * power_max_w / old.power_max_w, 1e6), 1)
     changed: dict[str, object] = dict.fromkeys(MAP)
     changed |= {
         "power_max_w": power_max_w,
-        "power_min_w": min(old.power_min_w, 0.5 * power_max_w),
-        "ramp_w_per_s": round(min(old.ramp_w_per_s * power_max_w / old.power_max_w, 1e6), 1),
+        "power_min_w": min(old.power_min_w, 0.5 * power_max_w, ramp_w_per_s),
+        "ramp_w_per_s": ramp_w_per_s,
         LINE[0]: _rounded(line.power_w, 1),
         LINE[1]: _rounded(line.fuel_g_per_s, 6),
         LINE_TOO[0]: None if line.speed_rpm is None else _rounded(line.speed_rpm, 1),
@@ -104,20 +99,19 @@ def vehicle_from_map(path: Path, base: str, name: str) -> MappedVehicle:
     content = under.model_dump() | {"name": name, "description": described}
     content["engine"] |= changed
     vehicle = validated(Vehicle, content, f"{path}, as the engine of {base}")
-    lost, at_w = non_convexity(line.power_w, line.fuel_g_per_s)
     remarks = [
         *line.remarks,
         f"of {under.name}: all but the engine's fuel and power; of its engine {KEPT}",
     ]
     if vehicle.engine.power_min_w != old.power_min_w:
-        remarks.append(f"power_min_w is {vehicle.engine.power_min_w:g}, half of the rated power")
+        remarks.append(
+            f"power_min_w is {vehicle.engine.power_min_w:g}: the base's is too much for this engine"
+        )
     return MappedVehicle(
         vehicle,
         _toml(vehicle, base, path, line, data),
         data,
         line,
-        100.0 * lost,
-        at_w,
         tuple(remarks),
     )
 

@@ -142,14 +142,19 @@ def _merged(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
 
 
 def _without_other_engine(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
-    """Drop the base's description of the engine's fuel where a file brings the other sort."""
+    """Drop what a base says of the engine's fuel where a file says it in another way.
+
+    A line replaces a map and a map a line, and a new line the speeds of the old one.
+    """
     under, over = base.get("engine"), own.get("engine")
     if not (isinstance(under, dict) and isinstance(over, dict)):
         return base
     of_line = (*LINE, *LINE_TOO)
-    dropped = (
-        MAP if any(k in over for k in of_line) else of_line if any(k in over for k in MAP) else ()
-    )
+    dropped: tuple[str, ...] = ()
+    if any(key in over for key in of_line):
+        dropped = (*MAP, *LINE_TOO) if LINE[0] in over else MAP
+    elif any(key in over for key in MAP):
+        dropped = of_line
     return {**base, "engine": {k: v for k, v in under.items() if k not in dropped}}
 
 

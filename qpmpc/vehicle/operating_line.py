@@ -14,10 +14,16 @@ from qpmpc.vehicle.engine_map import EngineData
 
 Floats = NDArray[np.float64]
 
+RAD_PER_S = np.pi / 30.0  # of a revolution per minute
+
 POINTS = 201  # of the line; straight between them
 SPEEDS = 400  # tried at each power, before the best is refined between its neighbours
-SAME_SPEED_RPM = 2.0  # points of a map that a test bench held at one speed
 SPEEDS_LEAST = 2
+# Points of a map whose speeds are less than this share of all speeds apart were held at one speed.
+SAME_SPEED = 0.005
+PER_SPEED_LEAST = 2  # points at a speed in the mean, else they are scattered
+WIDTH_MAX = 0.2  # of the points at a speed, in spacings between speeds: likewise
+IDLE_W = 1.0  # less power than that is none
 
 
 @dataclass(frozen=True)
@@ -40,7 +46,8 @@ class OperatingLine:
 def operating_line(path: Path, data: EngineData) -> OperatingLine:
     """Compute the line of a map, min over N of f(N, P / omega(N)), or take that of a curve.
 
-    A map's fuel rate is linear in triangles of its points (Delaunay), its torque limit the largest
+    Of a map's fuel rate, what is not c P is linear in triangles of its points (Delaunay), with c of
+    a least-squares fit of c P, N, N^2 and a constant. Its limits are the largest and the least
     torque at each speed, linear between speeds; of points that are not at some common speeds the
     edge of the hull. Below the least power of the data the line goes
     on straight to 0, an engine that idles.
@@ -54,9 +61,8 @@ def operating_line(path: Path, data: EngineData) -> OperatingLine:
     if data.torque_nm is None or data.speed_rpm is None:
         power, fuel, speed = _of_curve(path, data)
     else:
-        power, fuel, speed = _of_map(path, data.speed_rpm, data.torque_nm, data.fuel_g_per_s)
-        if _is_scattered(data.speed_rpm):
-            remarks.append("few points share a speed: the torque limit is the hull of all points")
+        power, fuel, speed = _of_map(path, data, remarks)
+    power = np.where(power < IDLE_W, 0.0, power)
     if (least := int(fuel.argmin())) > 0:
         remarks.append(f"below {power[least] / 1e3:.3g} kW fuel falls with power: left out")
         power, fuel = power[least:], fuel[least:]
@@ -91,43 +97,49 @@ def _of_curve(path: Path, data: EngineData) -> tuple[Floats, Floats, Floats | No
     if len(twice):
         raise InputError(f"{path}: power {power[twice[0]]:g} W is there twice")
     speed = None if data.speed_rpm is None else data.speed_rpm[order]
-    return power, data.fuel_g_per_s[order], speed
+    fuel = data.fuel_g_per_s[order]
+    if len(power) > POINTS:
+        fewer = np.linspace(power[0], power[-1], POINTS)
+        speed = None if speed is None else np.interp(fewer, power, speed)
+        power, fuel = fewer, np.interp(fewer, power, fuel)
+    return power, fuel, speed
 
 
-def _of_map(
-    path: Path, speed_rpm: Floats, torque_nm: Floats, fuel_g_per_s: Floats
-) -> tuple[Floats, Floats, Floats]:
-    points = np.column_stack([speed_rpm, torque_nm])
+def _of_map(path: Path, data: EngineData, remarks: list[str]) -> tuple[Floats, Floats, Floats]:
+    speed_rpm, torque_nm, fuel_g_per_s = _once(data, remarks)
     try:
-        fuel_at = LinearNDInterpolator(points, fuel_g_per_s, rescale=True)
+        rate = _Rate(speed_rpm, torque_nm, fuel_g_per_s)
     except (QhullError, ValueError):
         raise InputError(f"{path}: the points of a map must differ in speed and torque") from None
-    speeds, limit_nm = torque_limit(speed_rpm, torque_nm)
+    speeds, least_nm, most_nm = torque_range(speed_rpm, torque_nm)
     if len(speeds) < SPEEDS_LEAST:
         raise InputError(f"{path}: a map needs points at two speeds or more")
     if _is_scattered(speed_rpm):
-        limit_nm = np.full_like(speeds, torque_nm.max())
-    tried = np.linspace(speeds[0], speeds[-1], SPEEDS)
-    omega = tried * (np.pi / 30.0)
-    limit_w = np.interp(tried, speeds, limit_nm) * omega
-    least_w = float((speed_rpm * torque_nm).min() * (np.pi / 30.0))
-    power = np.linspace(least_w, float(limit_w.max()), POINTS)
+        remarks.append("few points share a speed: the torque limit is the hull of all points")
+        least_nm, most_nm = (np.full_like(speeds, f(torque_nm)) for f in (np.min, np.max))
+    tried = np.linspace(speed_rpm.min(), speed_rpm.max(), SPEEDS)
+    powers_w = speed_rpm * torque_nm * RAD_PER_S
+    power = np.linspace(float(powers_w.min()), float(powers_w.max()), POINTS)
 
     def fuel(n_rpm: Floats, power_w: Floats) -> Floats:
-        allowed = np.interp(n_rpm, speeds, limit_nm) * (1.0 + 1e-9)
-        torque = power_w / (n_rpm * (np.pi / 30.0))
-        found = np.asarray(fuel_at(n_rpm, torque))
-        return np.where((torque <= allowed) & np.isfinite(found), found, np.inf)
+        """Fuel rate where the engine can run, else infinite; shape (m,) each."""
+        torque = power_w / (n_rpm * RAD_PER_S)
+        can = torque <= np.interp(n_rpm, speeds, most_nm) * (1.0 + 1e-9)
+        can &= torque >= np.interp(n_rpm, speeds, least_nm) * (1.0 - 1e-9)
+        found = np.full(n_rpm.shape, np.inf)
+        found[can] = rate(n_rpm[can], torque[can])
+        return np.where(np.isfinite(found), found, np.inf)
 
-    rates = fuel(tried[None, :], power[:, None])
-    best = rates.argmin(axis=1)
-    least = rates[np.arange(POINTS), best]
-    at_rpm = tried[best]
-    for i in np.flatnonzero(np.isfinite(least)).tolist():
-        low, high = tried[max(best[i] - 1, 0)], tried[min(best[i] + 1, SPEEDS - 1)]
+    least, at_rpm = np.full(POINTS, np.inf), np.full(POINTS, np.nan)
+    for i in range(POINTS):
+        at_power = fuel(tried, np.full(SPEEDS, power[i]))
+        best = int(at_power.argmin())
+        least[i], at_rpm[i] = at_power[best], tried[best]
+        if not np.isfinite(least[i]):
+            continue
         found = minimize_scalar(
-            lambda n, p=power[i]: min(float(fuel(np.array(n), p)), 1e9),
-            bounds=(low, high),
+            lambda n, p=power[i]: min(float(fuel(np.array([n]), np.array([p]))[0]), 1e9),
+            bounds=(tried[max(best - 1, 0)], tried[min(best + 1, SPEEDS - 1)]),
             method="bounded",
             options={"xatol": 0.05},
         )
@@ -139,22 +151,63 @@ def _of_map(
     return power[there], least[there], at_rpm[there]
 
 
-def _is_scattered(speed_rpm: Floats) -> bool:
-    return len(torque_limit(speed_rpm, np.zeros_like(speed_rpm))[0]) > len(speed_rpm) / 2
+def _once(data: EngineData, remarks: list[str]) -> tuple[Floats, Floats, Floats]:
+    """Points of a map, each once: of those measured again the mean."""
+    points = np.column_stack([data.speed_rpm, data.torque_nm])  # type: ignore[list-item]
+    once, place = np.unique(points, axis=0, return_inverse=True)
+    again = len(points) - len(once)
+    if again:
+        remarks.append(f"{again} points measured again: the mean counts")
+    fuel = np.bincount(place.ravel(), data.fuel_g_per_s) / np.bincount(place.ravel())
+    return once[:, 0], once[:, 1], fuel
 
 
-def torque_limit(speed_rpm: Floats, torque_nm: Floats) -> tuple[Floats, Floats]:
-    """Largest torque at each speed of a map; shape (speeds,) each, speeds increasing.
+class _Rate:
+    """Fuel rate of a map, linear in triangles but for its part in proportion to power."""
 
-    Points within `SAME_SPEED_RPM` of the first of them are of one speed.
+    def __init__(self, speed_rpm: Floats, torque_nm: Floats, fuel_g_per_s: Floats) -> None:
+        power_w = speed_rpm * torque_nm * RAD_PER_S
+        terms = np.column_stack([power_w, speed_rpm, speed_rpm**2, np.ones_like(power_w)])
+        scale = np.abs(terms).max(axis=0)
+        self._per_w = float(
+            np.linalg.lstsq(terms / scale, fuel_g_per_s, rcond=None)[0][0] / scale[0]
+        )
+        self._rest = LinearNDInterpolator(
+            np.column_stack([speed_rpm, torque_nm]),
+            fuel_g_per_s - self._per_w * power_w,
+            rescale=True,
+        )
+
+    def __call__(self, speed_rpm: Floats, torque_nm: Floats) -> Floats:
+        power_w = speed_rpm * torque_nm * RAD_PER_S
+        return np.asarray(self._rest(speed_rpm, torque_nm) + self._per_w * power_w)
+
+
+def torque_range(speed_rpm: Floats, torque_nm: Floats) -> tuple[Floats, Floats, Floats]:
+    """Speeds of a map, and the least and the largest torque at each; shape (speeds,).
+
+    A speed is the mean of points whose speeds follow one another within `SAME_SPEED` of all.
     """
+    groups = _of_one_speed(speed_rpm)
+    return (
+        np.array([speed_rpm[group].mean() for group in groups]),
+        np.array([torque_nm[group].min() for group in groups]),
+        np.array([torque_nm[group].max() for group in groups]),
+    )
+
+
+def _of_one_speed(speed_rpm: Floats) -> list[NDArray[np.intp]]:
     order = np.argsort(speed_rpm, kind="stable")
-    speeds: list[float] = []
-    limits: list[float] = []
-    for n, torque in zip(speed_rpm[order].tolist(), torque_nm[order].tolist(), strict=True):
-        if speeds and n - speeds[-1] <= SAME_SPEED_RPM:
-            limits[-1] = max(limits[-1], torque)
-        else:
-            speeds.append(n)
-            limits.append(torque)
-    return np.array(speeds), np.array(limits)
+    speed = speed_rpm[order]
+    apart = np.diff(speed) > SAME_SPEED * (speed[-1] - speed[0])
+    return np.split(order, np.flatnonzero(apart) + 1)
+
+
+def _is_scattered(speed_rpm: Floats) -> bool:
+    """Whether points have speeds of their own: few are of one speed, or those are far apart."""
+    groups = _of_one_speed(speed_rpm)
+    if len(groups) * PER_SPEED_LEAST > len(speed_rpm):
+        return True
+    spacing = np.median(np.diff([speed_rpm[group].mean() for group in groups]))
+    width = np.median([np.ptp(speed_rpm[group]) for group in groups if len(group) > 1])
+    return bool(width > WIDTH_MAX * spacing)
