@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpmpc.vehicle.parameters import Engine
+from qpmpc.vehicle.engine_parameters import Engine
 
 SHORT_S = 3  # shorter ones are shown: no engine is started for so little
 

@@ -14,8 +14,9 @@ from qpmpc.engine_runs import run_figures
 from qpmpc.limits import Excess, excess_of, sentence
 from qpmpc.qp.expectation import Expectation
 from qpmpc.vehicle.battery import BatteryMaps
-from qpmpc.vehicle.parameters import STEP_S, Vehicle
+from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.plant import PlantState, StepFlows
+from qpmpc.vehicle.section import STEP_S
 
 Floats = NDArray[np.float64]
 

@@ -11,7 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from qpmpc.pwa.fit import PwaFit, fit_convex
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.engine import OptimalLine, alpha, optimal_line
-from qpmpc.vehicle.parameters import Battery, ColdEngine, Engine, Vehicle
+from qpmpc.vehicle.engine_parameters import ColdEngine, Engine
+from qpmpc.vehicle.parameters import Battery, Vehicle
 
 BATTERY_STEP_W = 25.0
 ALPHA_STEP_K = 0.05

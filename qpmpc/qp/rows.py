@@ -21,7 +21,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 from qpmpc.qp.expressions import FormulaError, expression, terms_of
-from qpmpc.vehicle.parameters import Engine
+from qpmpc.vehicle.engine_parameters import Engine
 
 SHORTEST_SCALE_S = 1.0  # a masked stage is scaled as one of 1 s
 COOL_SHARE = 0.5  # of the SOC reserve, where the thermostat is closed

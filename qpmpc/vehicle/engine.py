@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpmpc.errors import InputError
-from qpmpc.vehicle.parameters import ColdEngine, Engine
+from qpmpc.vehicle.engine_parameters import ColdEngine, Engine
 from qpmpc.vehicle.table import Table
 
 Floats = NDArray[np.float64]

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from qpmpc.settings import validated
 from qpmpc.shown import shown
 from qpmpc.vehicle.engine_map import EngineData, read_engine_data
+from qpmpc.vehicle.engine_parameters import LINE, LINE_TOO, MAP
 from qpmpc.vehicle.load import load_vehicle
 from qpmpc.vehicle.operating_line import OperatingLine, operating_line
-from qpmpc.vehicle.parameters import LINE, LINE_TOO, MAP, Vehicle
+from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.toml_text import Comment, comments_of, vehicle_file_text, vehicle_toml
 
 KEPT = "start cost, shortest runs, time to full power, cold multiplier and heat"

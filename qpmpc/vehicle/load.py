@@ -15,8 +15,9 @@ from qpmpc.errors import InputError
 from qpmpc.input_text import read_text
 from qpmpc.problems import shown_value
 from qpmpc.settings import load_toml, validated
+from qpmpc.vehicle.engine_parameters import LINE, LINE_TOO, MAP
 from qpmpc.vehicle.names import DEFAULT_VEHICLE, VEHICLES
-from qpmpc.vehicle.parameters import LINE, LINE_TOO, MAP, Vehicle
+from qpmpc.vehicle.parameters import Vehicle
 
 MEGABYTES_MAX = 1
 """A vehicle's file has some kilobytes."""

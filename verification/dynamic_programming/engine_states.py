@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.vehicle import PlantState
-from qpmpc.vehicle.parameters import Engine
+from qpmpc.vehicle.engine_parameters import Engine
 
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
