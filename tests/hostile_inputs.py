@@ -13,6 +13,7 @@ from qpmpc.faults.models import load_faults
 from qpmpc.registry import split_settings
 from qpmpc.settings import parse_settings
 from qpmpc.vehicle import load_vehicle
+from qpmpc.vehicle.from_map import vehicle_from_map
 
 ODD_NUMBERS = [
     "0", "-0.0", "1", "-1", "1e-308", "1e308", "1e999", "-1e999", "nan", "inf", "-inf",
@@ -77,6 +78,12 @@ def _shipped(name: str) -> str:
 CYCLE = "time_s,speed_mps,grade\n" + "".join(
     f"{k},{min(k, 40 - k, 12)},{0.01 if k > 20 else 0}\n" for k in range(41)
 )
+LOG = "Logger X\nTime;Vehicle Speed [km/h];Grade;RPM\ns;km/h;%;1/min\n" + "".join(
+    f"{k},0;{3 * min(k, 40 - k, 12)},5;{1 if k > 20 else 0};{800 + k}\n" for k in range(41)
+)
+ENGINE = "Speed [rpm],Torque [Nm],BSFC [g/kWh]\n" + "".join(
+    f"{n},{t},{220 + 3000 / t + n / 100}\n" for n in (1000, 2000, 3000) for t in (10, 40, 80, 110)
+)
 FAULTS = """[[fault]]
 kind = "offset"
 signal = "soc"
@@ -130,6 +137,10 @@ def _load_settings(_: Path, texts: list[str]) -> None:
     VEHICLE.with_settings(of_vehicle)
 
 
+def _load_map(path: Path) -> None:
+    vehicle_from_map(path, "prius-nimh", "mine")
+
+
 def _file(name: str, load: Callable[[Path], object]) -> Callable[[Path, bytes], None]:
     def loader(folder: Path, content: bytes) -> None:
         path = folder / name
@@ -158,4 +169,6 @@ LOADERS: dict[str, Loader] = {
         edited(FAULTS, "=") | st.binary(max_size=200), _file("faults.toml", load_faults)
     ),
     "settings": Loader(settings_texts(), _load_settings),
+    "log": Loader(edited(LOG, ";") | st.binary(max_size=200), _file("log.csv", load_cycle)),
+    "engine": Loader(edited(ENGINE, ",") | st.binary(max_size=200), _file("map.csv", _load_map)),
 }
