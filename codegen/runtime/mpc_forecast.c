@@ -208,11 +208,11 @@ static void fill_long(const mpc_forecast *forecast, int32_t is_arriving, mpc_in 
         in->long_speed_mps[k] = share * mean_of(&of->speed_mps, seconds);
         in->long_rises[k] = (is_arriving != 0) ? REAL(0.0) : (mpc_real)of->rises;
         const mpc_swing *const swing = &forecast->swing[k / MPC_CLASSES];
-        const int32_t first = (k / MPC_CLASSES) * forecast->block_s;
-        const int32_t after = first + forecast->block_s;
+        const int32_t block_s = (is_arriving != 0) ? 0 : forecast->block_s;
+        const int32_t first = (k / MPC_CLASSES) * block_s;
+        const int32_t after = first + block_s;
         const int32_t end = (after < forecast->covered) ? after : forecast->covered;
-        const int32_t is_ahead =
-            ((is_arriving == 0) && (first < end) && (forecast->next < end)) ? 1 : 0;
+        const int32_t is_ahead = ((first < end) && (forecast->next < end)) ? 1 : 0;
         in->long_fall_j[k] = (is_ahead != 0) ? swing->fall_j : REAL(0.0);
         in->long_rise_j[k] = (is_ahead != 0) ? swing->rise_j : REAL(0.0);
         /* with one class the preview is averaged: it has only the mean demand */

@@ -89,6 +89,7 @@ def write_report(study: Study, folder: Path) -> Path:
             (f"{section}.{key}", _text(value), unit_of(key))
             for section, values in vehicle.model_dump(exclude={"name", "description"}).items()
             for key, value in values.items()
+            if value is not None
         ],
         settings=preformatted(json.dumps(study.settings.model_dump(), indent=2)),
         provenance=provenance(),
