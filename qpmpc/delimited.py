@@ -96,7 +96,10 @@ def header_names(text: str) -> list[str]:
     lines, _ = _table_lines(text)
     if len(lines) < 2:
         return []
-    return [_named(cell.strip().strip('"'))[0] for cell in lines[0][1].split(_separator(lines))]
+    try:
+        return [_named(title)[0] for title in _cells(Path(), *lines[0], _separator(lines))]
+    except InputError:
+        return []
 
 
 def parse_delimited(path: Path, text: str) -> DelimitedTable:

@@ -87,6 +87,7 @@ def test_a_stamp_that_is_there_twice_is_left_out(tmp_path: Path) -> None:
         ("time,speed_mps\n0,0\n1,1\n2,2\n3,3\n", "'time' names no unit: add one of s, "),
         ("time_s,speed\n0,0\n1,1\n2,2\n3,3\n4,4\n", "'speed' names no unit: add one of m/s, "),
         ("time_s,speed [furlong]\n0,0\n1,1\n2,2\n3,3\n", "unit 'furlong', allowed: m/s"),
+        ('"x, time_s","speed_kmh"\n0,0\n1,1\n2,2\n3,3\n', "columns found"),
         ("time_s,speed_kmh,gps_speed_kmh\n0,0,0\n1,1,1\n", "speed is in two columns"),
         ("time_s,speed_kmh\n0,0\n1,x\n2,2\n3,3\n", "line 3: 'speed_kmh' is 'x'"),
         ("time_s;speed_kmh\n0;0\n1\n2;2\n3;3\n", "line 3: 1 values"),
