@@ -88,20 +88,16 @@ def vehicles(
 def _parameters(vehicle: "Vehicle") -> "ShownTable":
     from rich import box
 
+    from qpmpc.report.parameter_rows import parameter_rows
     from qpmpc.report.table import ShownTable
-    from qpmpc.report.units import unit_of
 
     table = ShownTable(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
     table.add_column("parameter", no_wrap=True)
     table.add_column("value", overflow="fold")
     table.add_column("unit", no_wrap=True)
-    for section, values in vehicle.model_dump(exclude={"name", "description"}).items():
-        for key, value in values.items():
-            if value is None:
-                continue
-            items = value if isinstance(value, tuple) else (value,)
-            text = " ".join(f"{item:.10g}" for item in items)
-            table.add_row(f"{section}.{key}", text, unit_of(key))
+    for section in parameter_rows(vehicle):
+        for row in section:
+            table.add_row(*row)
         table.add_section()
     return table
 

@@ -3,15 +3,14 @@
 import json
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.report.columns import COMPARE_COLUMNS, Row, filled, notes
 from qpmpc.report.html import html_page, preformatted
+from qpmpc.report.parameter_rows import parameter_rows
 from qpmpc.report.provenance import provenance
-from qpmpc.report.units import unit_of
 from qpmpc.results import INTEGRAL, OPTIMUM, REFERENCE, Run
 
 
@@ -54,12 +53,7 @@ def compare_html(
         ],
         integral_percent=100.0 * INTEGRAL,
         pictures={cycle: b64encode(data).decode() for cycle, data in pictures.items()},
-        parameters=[
-            (f"{section}.{key}", _text(value), unit_of(key))
-            for section, values in vehicle.model_dump(exclude={"name", "description"}).items()
-            for key, value in values.items()
-            if value is not None
-        ],
+        parameters=[row for section in parameter_rows(vehicle) for row in section],
         settings=preformatted(json.dumps(settings.model_dump(include=names), indent=2)),
         provenance=provenance(),
     )
@@ -73,11 +67,6 @@ def _fractional_demand(run: Run) -> str:
         return "-"
     low, high = np.percentile(there, [25, 75])
     return f"{low:.1f} to {high:.1f}"
-
-
-def _text(value: Any) -> str:
-    items = value if isinstance(value, tuple) else (value,)
-    return " ".join(f"{item:.10g}" for item in items)
 
 
 def _remarks(rows: Sequence[Row], settings: ControllerSettings) -> list[str]:

@@ -8,8 +8,8 @@ from typing import Any
 
 from qpmpc.files import json_text, write_text
 from qpmpc.report.html import html_page, preformatted
+from qpmpc.report.parameter_rows import parameter_rows
 from qpmpc.report.provenance import provenance
-from qpmpc.report.units import unit_of
 from qpmpc.verification.reproduction.checks import checks_of
 from qpmpc.verification.reproduction.exhibits import Picture
 from qpmpc.verification.reproduction.figure_pictures import (
@@ -85,19 +85,9 @@ def write_report(study: Study, folder: Path) -> Path:
         findings=findings(study, checks_of(study)),
         tables=tables,
         pictures=shown,
-        parameters=[
-            (f"{section}.{key}", _text(value), unit_of(key))
-            for section, values in vehicle.model_dump(exclude={"name", "description"}).items()
-            for key, value in values.items()
-            if value is not None
-        ],
+        parameters=[row for section in parameter_rows(vehicle) for row in section],
         settings=preformatted(json.dumps(study.settings.model_dump(), indent=2)),
         provenance=provenance(),
     )
     write_text(folder / PAGE, page)
     return folder / PAGE
-
-
-def _text(value: Any) -> str:
-    items = value if isinstance(value, tuple) else (value,)
-    return " ".join(f"{item:.10g}" for item in items)
