@@ -227,8 +227,8 @@ def _array(values: ArrayLike) -> NDArray[np.float64]:
 
 
 def _plant(vehicle: Vehicle, line: OptimalLine, maps: BatteryMaps) -> dict[str, float]:
-    """Maps of the plant that the QP does not contain; the plan's battery is at the initial SOC."""
-    cold, soc_init = vehicle.cold_engine, vehicle.trip.soc_init
+    """Maps of the plant that the QP does not contain; the plan's battery is at the mean SOC."""
+    cold, soc_mean = vehicle.cold_engine, vehicle.trip.soc_mean
     return {
         "fuel_step_w": float(line.power_w[1] - line.power_w[0]),  # grid of fuel_g_per_s, from 0
         **{f"cold_{name}": float(value) for name, value in cold.model_dump().items()},
@@ -238,9 +238,9 @@ def _plant(vehicle: Vehicle, line: OptimalLine, maps: BatteryMaps) -> dict[str, 
         "ramp_w_per_s": vehicle.engine.ramp_w_per_s,
         "aux_power_w": vehicle.battery.aux_power_w,
         "t_cl_init_degc": vehicle.trip.t_cl_init_degc,
-        "plan_voltage_v": maps.open_circuit.at(soc_init),
-        "plan_resistance_discharge_ohm": maps.discharge.at(soc_init),
-        "plan_resistance_charge_ohm": maps.charge.at(soc_init),
+        "plan_voltage_v": maps.open_circuit.at(soc_mean),
+        "plan_resistance_discharge_ohm": maps.discharge.at(soc_mean),
+        "plan_resistance_charge_ohm": maps.charge.at(soc_mean),
     }
 
 
@@ -257,12 +257,12 @@ def _solver(admm: AdmmSettings) -> dict[str, float]:
 def _rules(vehicle: Vehicle, rules: RuleBasedSettings) -> dict[str, float]:
     return {
         "rule_k_soc_w": rules.k_soc_w,
-        "rule_soc_ref": vehicle.trip.soc_init + rules.soc_ref_offset,
+        "rule_soc_ref": vehicle.trip.soc_target + rules.soc_ref_offset,
         "rule_on_w": rules.on_w,
         "rule_off_w": rules.off_w,
         "rule_power_min_w": rules.power_min_w,
         "rule_heat_power_w": rules.heat_power_w,
         "rule_heat_on_degc": rules.heat_on_degc,
         "rule_heat_off_degc": rules.heat_off_degc,
-        "rule_soc_forced": rules.soc_forced,
+        "rule_soc_forced": rules.forced_below(vehicle.battery),
     }

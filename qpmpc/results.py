@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 
 REFERENCE, OPTIMUM = "rule-based", "dp"  # controllers that the others are compared with
 COMPARABLE_SHARE = 0.03  # largest SOC correction, as a share of fuel, of a comparable run
+J_PER_KWH = 3.6e6
 MOSTLY = 0.5  # share of the time
 OFF_EXPECTED_PERCENT = 1.0  # from which on a run's fuel is in doubt, see docs/qp.md
 
@@ -115,18 +116,37 @@ class Run:
 
     @property
     def soc_correction_g(self) -> float:
-        """(SOC_init - SOC_end) E_bat / (eta_eq LHV): fuel that the battery gave or took."""
+        """(SOC_target - SOC_end) E_bat / (eta_eq LHV): fuel that the battery gave or took.
+
+        With `trip.soc_end_at_least` what is above the target is worth nothing.
+        """
         return self._correction_g(float(self.trajectory.soc[-1]))
 
     def _correction_g(self, soc_end: float) -> float:
+        trip = self.vehicle.trip
+        missing = trip.soc_target - soc_end
+        return self._worth_g(max(missing, 0.0) if trip.soc_end_at_least else missing)
+
+    def _worth_g(self, soc: float) -> float:
         trip, engine = self.vehicle.trip, self.vehicle.engine
-        energy_j = BatteryMaps(self.vehicle.battery).energy_j(trip.soc_init)
-        used_j = (float(self.trajectory.soc[0]) - soc_end) * energy_j
-        return used_j / (trip.eta_eq * engine.lhv_j_per_kg * 1e-3)
+        energy_j = BatteryMaps(self.vehicle.battery).energy_j(trip.soc_target)
+        return soc * energy_j / (trip.eta_eq * engine.lhv_j_per_kg * 1e-3)
+
+    @property
+    def depletion_g(self) -> float:
+        """Fuel worth of what the battery was to give, (SOC_init - SOC_target) E_bat likewise."""
+        trip = self.vehicle.trip
+        return max(self._worth_g(trip.soc_init - trip.soc_target), 0.0)
+
+    @property
+    def battery_used_j(self) -> float:
+        """Energy that left the battery's store, C_bat times the integral of U_oc over SOC."""
+        soc = self.trajectory.soc
+        return BatteryMaps(self.vehicle.battery).energy_between_j(float(soc[-1]), float(soc[0]))
 
     @property
     def fuel_soc_balanced_g(self) -> float:
-        """Fuel as if the run had ended at its initial SOC."""
+        """Fuel as if the run had ended at the SOC asked for."""
         return self.fuel_g + self.soc_correction_g
 
     @property
@@ -165,11 +185,13 @@ class Run:
     def not_comparable(self) -> list[str]:
         """Why the run's fuel cannot be compared with that of others; empty if it can."""
         found = list(self.reservations)
-        share = abs(self.soc_correction_g) / self.fuel_g if self.fuel_g else np.inf
+        spent_g = self.fuel_g + self.depletion_g
+        share = abs(self.soc_correction_g) / spent_g if spent_g else np.inf
         if self.soc_correction_g and share > COMPARABLE_SHARE:
+            and_charge = " and of what the battery was to give" if self.depletion_g else ""
             found.append(
-                f"the correction for its final SOC is {100.0 * share:.3g} % of its fuel, more than "
-                f"{100.0 * COMPARABLE_SHARE:g} %"
+                f"the correction for its final SOC is {100.0 * share:.3g} % of its fuel"
+                f"{and_charge}, more than {100.0 * COMPARABLE_SHARE:g} %"
             )
         left = sentence(self.vehicle, self.trajectory, self.excess)
         if left:
@@ -242,6 +264,9 @@ class Run:
             "friction_brake_j": float(tr.p_friction_w.sum()) * STEP_S,
             "fuel_expected_g": self.fuel_expected_g,
             "fuel_off_expected_percent": self.fuel_off_expected_percent,
+            "soc_end_target": self.vehicle.trip.soc_target,
+            "soc_end_at_least": self.vehicle.trip.soc_end_at_least,
+            "battery_used_kwh": self.battery_used_j / J_PER_KWH,
             **({} if self.faults is None else {"faults": self.faults}),
         }
 

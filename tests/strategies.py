@@ -17,6 +17,8 @@ NUMBERS = {
     "thermal.cabin_heat_w": st.floats(0.0, 1e4),
     "battery.aux_power_w": st.floats(0.0, 1e4),
     "trip.soc_init": st.floats(0.4, 0.8),
+    "trip.soc_end": st.floats(0.4, 0.8),
+    "trip.soc_end_at_least": st.booleans(),
     "trip.t_cl_init_degc": st.floats(-50.0, 150.0),
 }
 NAMES = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", fullmatch=True)
@@ -29,7 +31,7 @@ def batteries(draw: st.DrawFn) -> dict[str, object]:
     between = draw(st.lists(st.integers(100, 9900), max_size=40, unique=True))
     grid = [0.0, *(k / 10_000 for k in sorted(between)), 1.0]
     voltage = st.lists(st.floats(200.0, 400.0), min_size=len(grid), max_size=len(grid))
-    resistance = st.lists(st.floats(0.01, 0.3), min_size=len(grid), max_size=len(grid))
+    resistance = st.lists(st.floats(0.01, 0.15), min_size=len(grid), max_size=len(grid))
     return {
         "battery.soc_grid": tuple(grid),
         "battery.open_circuit_v": tuple(draw(voltage)),
@@ -55,6 +57,7 @@ def toml_of(changes: dict[str, object]) -> str:
     lines = []
     for key, value in changes.items():
         text = str(list(value)) if isinstance(value, tuple) else repr(value)
+        text = text.lower() if isinstance(value, bool) else text
         if isinstance(value, str):
             escaped = (c if c.isalnum() else f"\\U{ord(c):08X}" for c in value)
             text = f'"{"".join(escaped)}"'

@@ -133,7 +133,7 @@ static void scale_cost(mpc_state *state)
     const mpc_real curvature = REAL(2.0) * mpc_par.soc_penalty_g * state->cost
                                * last->column[MPC_VAR_SOC];
     last->hessian[MPC_VAR_SOC] = curvature * last->column[MPC_VAR_SOC];
-    last->q[MPC_VAR_SOC] += curvature * (state->origin_soc - mpc_par.soc_init);
+    last->q[MPC_VAR_SOC] += curvature * (state->origin_soc - mpc_par.soc_target);
 }
 
 void mpc_qp_update(mpc_state *state)

@@ -1,4 +1,4 @@
-"""Charge balance of the rules: the SOC reference with which they end a trip at its initial SOC."""
+"""Charge balance of the rules: the SOC reference with which they arrive as asked."""
 
 import numpy as np
 
@@ -12,19 +12,19 @@ BISECTIONS = 10
 
 
 def soc_drift(trip: Trip, rules: RuleBasedSettings) -> float:
-    """SOC_end - SOC_init of the rules over a trip."""
+    """Final SOC of the rules less the SOC asked for, over a trip."""
     driver, state = RuleBased(trip, rules=rules), trip.plant.initial_state()
     for t in range(trip.steps):
         seen = trip.observation(t, state)
         command = driver.decide(seen).command
         state, _ = trip.plant.step(state, command, seen.demand_w, seen.speed_mps)
-    return state.soc - trip.vehicle.trip.soc_init
+    return state.soc - trip.vehicle.trip.soc_target
 
 
 def balanced(trip: Trip, rules: RuleBasedSettings) -> RuleBasedSettings:
     """Return the thresholds with the SOC reference that balances this trip best.
 
-    The reference is sought outward from the initial SOC: the first offset at which the drift
+    The reference is sought outward from the SOC asked for: the first offset at which the drift
     changes sign, refined by bisection; if it never does, the offset of the smallest drift.
     Rules with timers jump, so the smallest drift found on the way is used. This needs the trip in
     advance, as any charge-sustaining comparison of rules does; it is not a causal tuning.

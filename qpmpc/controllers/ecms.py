@@ -17,7 +17,7 @@ class Ecms(Controller):
         H = alpha(T) F(P_eng) + (s G(P_d + P_aux - P_eng) - mu Q(P_eng)) / LHV      [g/s]
 
     with F fuel of the hot engine, G internal battery power, Q heat into the coolant. The
-    equivalence factor follows the SOC, s = s0 + k_p e + k_i sum(e), e = SOC_init - SOC, and the
+    equivalence factor follows the SOC, s = s0 + k_p e + k_i sum(e), e = SOC_target - SOC, and the
     coolant's costate mu rises linearly from 0 at the edge of the band above the lower coolant
     limit to `heat_factor` at the limit. The safety layer has the last word.
 
@@ -45,7 +45,7 @@ class Ecms(Controller):
     def equivalence_factor(self, soc: float) -> float:
         """Equivalence factor s for a measured SOC, with the sum of earlier deviations."""
         s = self._ecms
-        error = self._vehicle.trip.soc_init - soc
+        error = self._vehicle.trip.soc_target - soc
         factor = s.factor + s.factor_per_soc * error + s.factor_per_soc_s * self._sum_soc_s
         return min(max(factor, s.factor_min), s.factor_max)
 
@@ -75,5 +75,5 @@ class Ecms(Controller):
         allowed = terminal_w <= battery.power_discharge_max_w
         allowed[1:] &= terminal_w[1:] >= -accepted_w
         best = int(np.where(allowed, cost_w, np.inf).argmin())
-        self._sum_soc_s += vehicle.trip.soc_init - seen.soc
+        self._sum_soc_s += vehicle.trip.soc_target - seen.soc
         return Command(best > 0, float(self._power_w[best]))

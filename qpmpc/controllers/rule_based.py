@@ -60,9 +60,9 @@ class RuleBased(Controller):
         s, vehicle = self.rules, self.trip.vehicle
         battery = vehicle.battery
         net_w = seen.demand_w + battery.aux_power_w
-        reference = vehicle.trip.soc_init + s.soc_ref_offset
+        reference = vehicle.trip.soc_target + s.soc_ref_offset
         requested = net_w + s.k_soc_w * (reference - seen.soc)
-        forced = seen.soc < s.soc_forced or net_w > battery.power_discharge_max_w
+        forced = seen.soc < s.forced_below(battery) or net_w > battery.power_discharge_max_w
         shortest_s = max(s.min_on_s, vehicle.engine.min_on_s)
         is_held = seen.engine_on and seen.engine_for_s < shortest_s
         if requested > s.on_w or forced:

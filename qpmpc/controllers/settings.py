@@ -14,11 +14,13 @@ from qpmpc.qp.scaling import ScalingSettings
 from qpmpc.qp.stage_qp import QpSettings
 from qpmpc.settings import apply_settings, validated
 from qpmpc.solvers.settings import AdmmSettings
+from qpmpc.vehicle.parameters import Battery
 
 Model = TypeVar("Model", bound=BaseModel)
 Watts = Annotated[float, Field(ge=0.0, le=1e6)]  # beyond any engine and battery together
 Celsius = Annotated[float, Field(ge=-100.0, le=150.0)]
 Factor = Annotated[float, Field(ge=0.0, le=20.0)]
+FORCED_ABOVE_MIN = 0.05
 Gain = Annotated[float, Field(ge=0.0, le=1e4)]  # 1: a whole factor within 0.0001 of SOC
 
 
@@ -28,14 +30,14 @@ class RuleBasedSettings(BaseModel):
     Attributes
     ----------
     k_soc_w : P_r = P_d + P_aux + k_soc (SOC_ref - SOC)
-    balance : choose SOC_ref for the trip at hand so that it ends at its initial SOC
-    soc_ref_offset : SOC_ref - SOC_init, used unchanged without `balance`
+    balance : choose SOC_ref for the trip at hand so that it ends at the SOC asked for
+    soc_ref_offset : SOC_ref less the SOC to arrive with, used unchanged without `balance`
     on_w, off_w : the engine starts above the first and stops below the second
     min_on_s : shortest run
     power_min_w : least power when it runs for power
     heat_power_w : power when it runs for heat alone
     heat_on_degc, heat_off_degc : heat request below the first, until above the second
-    soc_forced : forced on below this SOC
+    soc_forced : forced on below this SOC; if None 0.05 above the lower limit
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -50,7 +52,7 @@ class RuleBasedSettings(BaseModel):
     heat_power_w: Watts = 4e3
     heat_on_degc: Celsius = 50.0
     heat_off_degc: Celsius = 52.0
-    soc_forced: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.45
+    soc_forced: Annotated[float, Field(gt=0.0, lt=1.0)] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -59,6 +61,10 @@ class RuleBasedSettings(BaseModel):
         if self.heat_on_degc > self.heat_off_degc:
             raise ValueError("heat_on_degc must not be above heat_off_degc")
         return self
+
+    def forced_below(self, battery: Battery) -> float:
+        """Return the SOC below which the engine is forced on."""
+        return battery.soc_min + FORCED_ABOVE_MIN if self.soc_forced is None else self.soc_forced
 
 
 class MhQpSettings(BaseModel):

@@ -53,7 +53,7 @@ class Trace:
 def internal_off_w(vehicle: Vehicle, net_w: NDArray[np.float64]) -> NDArray[np.float64]:
     """Internal battery power when it alone meets P0, l(P0), W; same shape.
 
-    At the trip's initial SOC; beyond the discharge limit, at that limit.
+    At the trip's mean SOC; beyond the discharge limit, at that limit.
     """
     power = np.minimum(net_w, vehicle.battery.power_discharge_max_w)
-    return BatteryMaps(vehicle.battery).internal_power_w(vehicle.trip.soc_init, power)
+    return BatteryMaps(vehicle.battery).internal_power_w(vehicle.trip.soc_mean, power)

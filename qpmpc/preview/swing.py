@@ -61,7 +61,7 @@ def swings(
     following = np.append(own[:, 1:], np.zeros((2, 1)), axis=1)
     battery = vehicle.battery
     room = battery.soc_max - battery.soc_min
-    most = 0.5 * room * BatteryMaps(battery).energy_j(vehicle.trip.soc_init)
+    most = 0.5 * room * BatteryMaps(battery).energy_j(vehicle.trip.soc_mean)
     kept: Floats = np.minimum(settings.swing_share * np.maximum(own, following), most)
     return np.maximum(kept, LEAST_KEPT_J)
 

@@ -48,9 +48,9 @@ class PwaModel:
     Attributes
     ----------
     fuel : hot engine on its optimal line, engine on: power W -> fuel g/s
-    battery : terminal power W -> internal power W at the trip's initial SOC
+    battery : terminal power W -> internal power W at the trip's mean SOC
     alpha : coolant degC -> cold multiplier
-    battery_energy_j : energy of a unit of SOC at the trip's initial SOC
+    battery_energy_j : energy of a unit of SOC at the trip's mean SOC
     line : the optimal line that `fuel` fits
     """
 
@@ -64,7 +64,7 @@ class PwaModel:
     def of(cls, vehicle: Vehicle, tolerances: PwaTolerances | None = None) -> "PwaModel":
         """Fit the PWA curves of a vehicle."""
         tol = tolerances or PwaTolerances()
-        soc = vehicle.trip.soc_init
+        soc = vehicle.trip.soc_mean
         return cls(
             fuel=_fuel(vehicle.engine, tol.fuel_g_per_s, tol.fuel_knee_w),
             battery=_battery(vehicle.battery, soc, tol.battery_w, tol.battery_share),
@@ -97,7 +97,7 @@ def _alpha(cold: ColdEngine, coldest: float, hottest: float, tolerance: float) -
 
 def battery_samples(vehicle: Vehicle) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Sample terminal power (W) -> internal power (W) over the battery's power range."""
-    return _battery_samples(vehicle.battery, vehicle.trip.soc_init)
+    return _battery_samples(vehicle.battery, vehicle.trip.soc_mean)
 
 
 def _battery_samples(

@@ -130,7 +130,7 @@ class CvxpyTwin:
         for var, weights in self._smoothing.items():
             cost += 0.5 * cp.sum_squares(cp.multiply(weights, self.variables[var]))
         if self.settings.soc_penalty_g:
-            gap = self.soc[-1] - self.vehicle.trip.soc_init
+            gap = self.soc[-1] - self.vehicle.trip.soc_target
             cost += self.settings.soc_penalty_g * cp.square(gap)
         return cost
 

@@ -53,7 +53,7 @@ class Polish:
     """
 
     def __init__(self, vehicle: Vehicle, model: PwaModel) -> None:
-        maps, soc = BatteryMaps(vehicle.battery), vehicle.trip.soc_init
+        maps, soc = BatteryMaps(vehicle.battery), vehicle.trip.soc_mean
         self._vehicle, self._slope = vehicle, model.fuel.slope
         self._begin_w = model.fuel.breakpoints[:-1]
         square = maps.open_circuit.at(soc) ** 2

@@ -33,9 +33,11 @@ class QpSettings(BaseModel):
 
     Attributes
     ----------
-    terminal_low, terminal_high : terminal SOC band as multiples of the initial SOC (paper eq. 11)
+    terminal_low, terminal_high : terminal SOC band as multiples of the SOC at arrival
+        that the trip asks for (paper eq. 11); of no effect with `trip.soc_end_at_least`
     soc_penalty_g : lambda of a quadratic terminal cost, g per (unit SOC)^2, instead of the band
-    soc_reserve : share of the room between the lower SOC limit and the initial SOC that is planned
+    soc_reserve : share of the room between the lower SOC limit and the lower one of the SOC at
+        departure and that at arrival that is planned
         to be left at the end of a block in which the thermostat opens, half of it where not: if the
         coolant limits the engine more than the plan knows, the battery has to give the rest
     t_cl_margin_k : the coolant is planned to stay this far above its lower limit, beside the
@@ -87,13 +89,15 @@ def qp_parameters(
         If the terminal SOC band is empty.
     """
     engine, battery, thermal, trip = vehicle.engine, vehicle.battery, vehicle.thermal, vehicle.trip
-    soc_low = max(settings.terminal_low * trip.soc_init, battery.soc_min)
-    soc_high = min(settings.terminal_high * trip.soc_init, battery.soc_max)
+    soc_low = max(settings.terminal_low * trip.soc_target, battery.soc_min)
+    soc_high = min(settings.terminal_high * trip.soc_target, battery.soc_max)
+    if trip.soc_end_at_least:
+        soc_low, soc_high = trip.soc_target, battery.soc_max
     if soc_low > soc_high:
         raise InputError(
             f"terminal_low={settings.terminal_low:g} and terminal_high={settings.terminal_high:g} "
-            f"times soc_init={trip.soc_init:g}, within soc_min={battery.soc_min:g} and "
-            f"soc_max={battery.soc_max:g}, leave no terminal SOC: {soc_low:g} is above "
+            f"times the SOC at arrival, {trip.soc_target:g}, within soc_min={battery.soc_min:g} "
+            f"and soc_max={battery.soc_max:g}, leave no terminal SOC: {soc_low:g} is above "
             f"{soc_high:g}"
         )
     crank_j = cranking_j(vehicle, model)
@@ -117,8 +121,9 @@ def qp_parameters(
         "soc_min": battery.soc_min,
         "soc_max": battery.soc_max,
         "soc_init": trip.soc_init,
+        "soc_target": trip.soc_target,
         # of stages of more than 1 s, above soc_min
-        "soc_reserve": settings.soc_reserve * max(trip.soc_init - battery.soc_min, 0.0),
+        "soc_reserve": settings.soc_reserve * max(trip.soc_lower_end - battery.soc_min, 0.0),
         "reach_margin_soc": REACH_MARGIN_SOC + crank_j / model.battery_energy_j,
         "terminal_soc_low": soc_low,
         "terminal_soc_high": soc_high,
@@ -301,7 +306,7 @@ class StageQp:
         if self.settings.soc_penalty_g:
             curvature = 2.0 * self.settings.soc_penalty_g * scale * column[-1, Var.SOC]
             hessian[-1, Var.SOC] = curvature * column[-1, Var.SOC]
-            gradient[-1, Var.SOC] -= curvature * self.vehicle.trip.soc_init
+            gradient[-1, Var.SOC] -= curvature * self.vehicle.trip.soc_target
         return QpData(
             hessian=hessian.ravel(),
             q=gradient.ravel(),

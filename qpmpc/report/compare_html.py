@@ -97,7 +97,7 @@ def _remarks(rows: Sequence[Row], settings: ControllerSettings) -> list[str]:
         if settings.rule_based.balance:
             remarks.append(
                 "The SOC reference of the rules was chosen for each trip, knowing it, so that the "
-                "trip ends as nearly as possible at its initial SOC."
+                "trip ends as nearly as possible at the SOC asked for."
             )
     if OPTIMUM in present:
         remarks.append(

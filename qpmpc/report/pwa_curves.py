@@ -60,7 +60,7 @@ def pwa_curves(vehicle: Vehicle) -> list[PwaCurve]:
             y_unit_name="g/s",
         ),
         PwaCurve(
-            title=f"battery at SOC {vehicle.trip.soc_init:g}",
+            title=f"battery at SOC {vehicle.trip.soc_mean:g}",
             x_label="terminal power kW",
             y_label="internal power kW",
             x=battery_samples(vehicle)[0],

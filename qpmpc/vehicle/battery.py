@@ -22,12 +22,24 @@ class BatteryMaps:
         self.discharge = Table(battery.soc_grid, battery.resistance_discharge_ohm)
         self.charge = Table(battery.soc_grid, battery.resistance_charge_ohm)
         self.charge_c = 3600.0 * battery.capacity_ah
+        self._soc_grid = battery.soc_grid
         self._soc_max = battery.soc_max
         self._power_charge_max_w = battery.power_charge_max_w
 
     def energy_j(self, soc: float) -> float:
         """Energy of a unit of SOC about `soc`: U_oc(soc) times the capacity, in J."""
         return self.open_circuit.at(soc) * self.charge_c
+
+    def energy_between_j(self, soc_low: float, soc_high: float) -> float:
+        """Energy in the store between two SOC, C_bat int U_oc dSOC; negative the other way round.
+
+        Exact for the tabulated U_oc, which is linear between its points.
+        """
+        inside = [soc for soc in self._soc_grid if soc_low < soc < soc_high]
+        inside = inside or [soc for soc in reversed(self._soc_grid) if soc_high < soc < soc_low]
+        soc = [soc_low, *inside, soc_high]
+        volts = [self.open_circuit.at(each) for each in soc]
+        return self.charge_c * float(np.trapezoid(volts, soc))
 
     def current_a(self, soc: float, power_w: float) -> float:
         """Current at terminal power, I = [U - sqrt(U^2 - 4 R P)] / (2 R), discharge positive.

@@ -58,8 +58,8 @@ class Capability:
         most_w = battery.power_discharge_max_w + engine.power_max_w
         fastest = FASTEST * _level_speed_mps(vehicle, most_w)
         weight_n = vehicle.chassis.mass_kg * GRAVITY_MPS2
-        at_init = vehicle.trip.soc_init  # the SOC of l(P0) in a preview
-        inner = [float(maps.internal_power_w(at_init, p)) for p in limits_w]
+        at_mean = vehicle.trip.soc_mean  # the SOC of l(P0) in a preview
+        inner = [float(maps.internal_power_w(at_mean, p)) for p in limits_w]
         return cls(
             hottest_degc=BOILING_DEGC,
             coldest_degc=COLDEST_MEASURED_DEGC,
@@ -72,7 +72,7 @@ class Capability:
             net_max_w=most_w + ROUNDING_W,
             internal_min_w=inner[1] - ROUNDING_W,
             internal_max_w=inner[0] + ROUNDING_W,
-            energy_j=maps.energy_j(at_init),
+            energy_j=maps.energy_j(at_mean),
         )
 
 

@@ -162,11 +162,32 @@ class Battery(Section):
 
 
 class Trip(Section):
-    """Initial state of a run, and the price of a difference in final SOC."""
+    """State at departure, SOC to arrive with, and the price of a difference in final SOC.
+
+    `soc_end` is `soc_init` where it is not given. With `soc_end_at_least` an SOC above it at
+    arrival is allowed, and worth nothing.
+    """
 
     soc_init: Share
+    soc_end: Share | None = None
+    soc_end_at_least: bool = False
     t_cl_init_degc: Annotated[float, Field(ge=-50.0, le=150.0)]  # no colder than the air
     eta_eq: Annotated[float, Field(ge=0.01, lt=1.0)]
+
+    @property
+    def soc_target(self) -> float:
+        """SOC to arrive with."""
+        return self.soc_init if self.soc_end is None else self.soc_end
+
+    @property
+    def soc_mean(self) -> float:
+        """Half way from departure to arrival: where a plan takes the battery's curves."""
+        return 0.5 * (self.soc_init + self.soc_target)
+
+    @property
+    def soc_lower_end(self) -> float:
+        """The lower one of the two."""
+        return min(self.soc_init, self.soc_target)
 
 
 class Vehicle(Section):
@@ -183,8 +204,11 @@ class Vehicle(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if not self.battery.soc_min <= self.trip.soc_init <= self.battery.soc_max:
-            raise ValueError("trip.soc_init must lie between battery.soc_min and battery.soc_max")
+        for name, soc in (("soc_init", self.trip.soc_init), ("soc_end", self.trip.soc_target)):
+            if not self.battery.soc_min <= soc <= self.battery.soc_max:
+                raise ValueError(
+                    f"trip.{name} must lie between battery.soc_min and battery.soc_max"
+                )
         most_j = CRANKING_SHARE * self.battery.power_discharge_max_w * STEP_S
         if self.engine.start_energy_j > most_j:
             raise ValueError(

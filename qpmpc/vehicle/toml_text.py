@@ -67,7 +67,7 @@ def vehicle_toml(vehicle: Vehicle, comments: Mapping[str, Comment] | None = None
         for key, number in value.items():
             if number is None:
                 continue
-            written = _array(key, number) if isinstance(number, tuple) else repr(number)
+            written = _array(key, number) if isinstance(number, tuple) else _scalar(number)
             lines += _entry(key, written, known.get(f"{name}.{key}", nothing))
     return "\n".join(lines) + "\n"
 
@@ -128,11 +128,15 @@ def _comment_line(text: str) -> str:
     return shown(text.expandtabs())
 
 
+def _scalar(value: float | bool) -> str:
+    return str(value).lower() if isinstance(value, bool) else repr(value)
+
+
 def _array(key: str, values: tuple[float, ...]) -> str:
     inside = ", ".join(repr(value) for value in values)
     if len(f"{key} = [{inside}]") <= WIDTH:
         return f"[{inside}]"
-    wrapped = textwrap.fill(inside, WIDTH, initial_indent="  ", subsequent_indent="  ")
+    wrapped = textwrap.fill(inside, WIDTH - 1, initial_indent="  ", subsequent_indent="  ")
     return f"[\n{wrapped},\n]"
 
 

@@ -3,7 +3,8 @@ from qpmpc.vehicle import load_vehicle
 
 DIMENSIONLESS = {
     "rotating_mass_factor", "eta_drive", "eta_regen", "indicated_efficiency", "k", "exponent",
-    "exhaust_share", "soc_grid", "soc_min", "soc_max", "soc_init", "eta_eq",
+    "exhaust_share", "soc_grid", "soc_min", "soc_max", "soc_init", "soc_end",
+    "soc_end_at_least", "eta_eq",
 }  # fmt: skip
 
 

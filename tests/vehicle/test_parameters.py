@@ -20,7 +20,14 @@ def _text() -> str:
 
 
 def test_shipped_vehicles_load_and_the_default_comes_first():
-    assert vehicle_names() == ("prius-nimh", "prius-liion", "paper-liion", "paper-nimh")
+    assert vehicle_names() == (
+        "prius-nimh",
+        "prius-liion",
+        "prius-prime",
+        "sonata-hybrid",
+        "paper-liion",
+        "paper-nimh",
+    )
     for name in vehicle_names():
         assert load_vehicle(name).name == name
 

@@ -6,8 +6,9 @@ the limits and every price lam >= 0 of energy satisfy
     fuel + lam (W_0 - W_n) >= L(lam) = min sum_k h [ alpha(T_k) f(p_k) + lam G(P_k) ] + starts
 
 over all engine commands, with the coolant's dynamics kept and those of SOC left to its price
-(Lagrangian relaxation). `lower_bound` maximises L over lam. Where SOC_n >= SOC_0 the left side is
-at most the fuel, so that L is a lower bound on it. No convexity is assumed, nothing linearised.
+(Lagrangian relaxation). Where SOC_n is at least the SOC to arrive with, whose energy is W_end, the
+left side is at most fuel + lam (W_0 - W_end), so that L - lam (W_0 - W_end) is a lower bound on the
+fuel. `lower_bound` maximises it over lam. No convexity is assumed, nothing linearised.
 A start burns its fuel, whose heat goes where that of other fuel goes, and its cranking adds to the
 terminal power P of that second. The ramp of the engine and its shortest runs and rests are left
 out: they only forbid.
@@ -57,7 +58,7 @@ class LowerBound:
 
     Attributes
     ----------
-    fuel_g : L; fuel + price (W_0 - W_n) of any run is at least this
+    fuel_g : L - lam (W_0 - W_end); fuel + lam (W_end - W_n) of any run is at least this
     price_g_per_j : lam
     numerical_g : amount subtracted for interpolation; with a finer grid the bound would rise by
         about this
@@ -91,13 +92,13 @@ class _Tables(NamedTuple):
 
 
 def lower_bound(cycle: Cycle, vehicle: Vehicle) -> LowerBound:
-    """Compute max_lam L(lam), a lower bound on the fuel of any run with SOC_n >= SOC_0.
+    """Compute max_lam L(lam) - lam (W_0 - W_end), a lower bound on fuel; see the module.
 
     Parameters
     ----------
     cycle : the cycle driven
-    vehicle : the plant; the run starts at `vehicle.trip` and keeps the limits of SOC, coolant,
-        engine and battery
+    vehicle : the plant; the run starts and ends as `vehicle.trip` says and keeps the limits of
+        SOC, coolant, engine and battery
 
     Raises
     ------
@@ -112,15 +113,19 @@ def lower_bound(cycle: Cycle, vehicle: Vehicle) -> LowerBound:
         )
     tables = _tables(cycle, vehicle)
     lhv = vehicle.engine.lhv_j_per_kg * 1e-3
+    trip = vehicle.trip
     low, high = 1.0 / (LAST_EFFICIENCY * lhv), 1.0 / (FIRST_EFFICIENCY * lhv)
+    given_j = stored_energy_j(vehicle, trip.soc_init) - stored_energy_j(vehicle, trip.soc_target)
+    if given_j > 0.0:
+        low = 0.0  # with enough of it more is worth nothing
 
     def bound(price: float, strict: float = 1.0) -> float:
         value = _sweep(tables, price, strict)[0]  # from an engine that is off
         # the value falls with T: the grid point above the start is a lower bound at it
         node = int(np.searchsorted(tables.t_degc, start - 1e-9))
-        return float(value[min(node, len(value) - 1)])
+        return float(value[min(node, len(value) - 1)]) - price * given_j
 
-    # L is concave in lam: golden section
+    # concave in lam: golden section
     inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
     found = [bound(inner[0]), bound(inner[1])]
     for _ in range(PRICE_SEARCHES):

@@ -83,9 +83,9 @@ def limits_kept(context: Context) -> Iterator[Check]:
         )
         yield Check(
             f"Final SOC, {loop.name}",
-            "The trip ends within 1 % of its initial SOC (paper eq. 11).",
+            "The trip ends within 1 % of the SOC asked for, its first if none is (paper eq. 11).",
             0.01,
-            abs(float(tr.soc[-1] / tr.soc[0]) - 1.0),
+            abs(float(tr.soc[-1]) / context.vehicle.trip.soc_target - 1.0),
             "relative",
             f"{tr.soc[0]:.4f} to {tr.soc[-1]:.4f}",
         )

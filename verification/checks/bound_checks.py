@@ -50,7 +50,9 @@ def optimum_of(context: Context, cycle: str) -> Run:
 
 def _below(bound: LowerBound, finished: Run) -> Check:
     soc, vehicle = finished.trajectory.soc, finished.vehicle
-    used_j = stored_energy_j(vehicle, float(soc[0])) - stored_energy_j(vehicle, float(soc[-1]))
+    used_j = stored_energy_j(vehicle, vehicle.trip.soc_target) - stored_energy_j(
+        vehicle, float(soc[-1])
+    )
     priced_g = finished.fuel_g + bound.price_g_per_j * used_j
     return Check(
         f"Bound below {finished.controller}, {finished.cycle}",

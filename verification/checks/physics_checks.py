@@ -119,7 +119,7 @@ def constant_demand(context: Context) -> Iterator[Check]:
     qp = StageQp(vehicle, model, n, QpSettings(regularisation=1e-9), ScalingSettings())
     worst, shown = 0.0, []
     for net_w in (1000.0, 4000.0, 9000.0, 20000.0):
-        off_w = float(equations.internal_w(vehicle.trip.soc_init, net_w))
+        off_w = float(equations.internal_w(vehicle.trip.soc_mean, net_w))
         fields = (duration / n, net_w, 10.0, off_w, 0.0, 0.0, 0.0)
         stages = Stages(*(np.full(n, value) for value in fields))
         about = Linearisation.constant(n, 50.0)

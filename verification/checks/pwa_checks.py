@@ -34,7 +34,7 @@ def curves_of(vehicle: Vehicle) -> dict[str, tuple[Curve, float, float, str, flo
             COARSE_FUEL_G_PER_S,
         ),
         "battery": (
-            lambda p: equations.internal_w(vehicle.trip.soc_init, p),
+            lambda p: equations.internal_w(vehicle.trip.soc_mean, p),
             -battery.power_charge_max_w,
             battery.power_discharge_max_w,
             "W",

@@ -16,6 +16,8 @@ from qpmpc.verification.dynamic_programming.trajectory import Trajectory
 MOVES = 6
 MOVES_BEFORE_WIDENING = 2
 WIDENING = 1.5
+LARGEST_J = 6e6
+"""Energy of the whole battery up to which cells in SOC are taken as they are set."""
 
 
 def solve(
@@ -28,9 +30,11 @@ def solve(
     """Solve all levels; see `solve_dp` of this package."""
     problem = build_problem(cycle, vehicle)
     soc_step, t_cl_step_k, power, _ = settings.cells
+    part = _part_of_soc(problem)
+    soc_step *= part
     coarse = Grid.full(problem, soc_step, t_cl_step_k, power)
     *half_width, refinement = settings.tube(cycle.duration_s)
-    width = (half_width[0], half_width[1])
+    width = (half_width[0] * part, half_width[1])
     fine = (soc_step / refinement, t_cl_step_k / refinement)
     levels = []
 
@@ -65,6 +69,15 @@ def solve(
             width = (width[0] * WIDENING, width[1] * WIDENING)
     progress(1.0)
     return _solution(cycle, problem, path, levels)
+
+
+def _part_of_soc(problem: Problem) -> float:
+    """What cells and tube are of the SOC that they are set to: 1, less with a large battery.
+
+    There a cell of a plug-in's SOC holds as much energy as one of a battery of `LARGEST_J`.
+    """
+    vehicle = problem.plant.vehicle
+    return min(1.0, LARGEST_J / problem.plant.battery.energy_j(vehicle.trip.soc_mean))
 
 
 def _level(grid: Grid, path: Trajectory) -> DpLevel:

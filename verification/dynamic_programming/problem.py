@@ -30,7 +30,8 @@ class Problem:
     demand_w, speed_mps : shape (n,)
     running, starting : power of an engine that ran before, and of one that starts
     off_allowed : shape (n,)
-    soc_init, t_cl_init_degc : start; soc_init is also the least final SOC
+    soc_init, t_cl_init_degc : start
+    soc_end : least final SOC
     """
 
     plant: Plant
@@ -43,6 +44,7 @@ class Problem:
     starting: PowerLimits
     off_allowed: Bools
     soc_init: float
+    soc_end: float
     t_cl_init_degc: float
 
     @property
@@ -90,7 +92,7 @@ def build_problem(cycle: Cycle, vehicle: Vehicle) -> Problem:
     running, starting, off_allowed = power_limits(vehicle, demand)
     greatest_w = float(max(running.high_w.max(), starting.high_w.max()))
     lhv_j_per_g = engine.lhv_j_per_g
-    fuel_per_soc = plant.battery.energy_j(trip.soc_init) / (trip.eta_eq * lhv_j_per_g)
+    fuel_per_soc = plant.battery.energy_j(trip.soc_target) / (trip.eta_eq * lhv_j_per_g)
     maps = Maps(
         soc_grid=np.array(battery.soc_grid),
         open_circuit_v=np.array(battery.open_circuit_v),
@@ -128,5 +130,6 @@ def build_problem(cycle: Cycle, vehicle: Vehicle) -> Problem:
         starting=starting,
         off_allowed=off_allowed,
         soc_init=trip.soc_init,
+        soc_end=trip.soc_target,
         t_cl_init_degc=trip.t_cl_init_degc,
     )

@@ -45,7 +45,8 @@ class DpSettings(BaseModel):
     Attributes
     ----------
     grid : `reference`, or `quick`, ten times as fast; see docs/dynamic_programming.md for errors
-    soc_step, t_cl_step_k : cells of the coarse grid, 1 and K
+    soc_step, t_cl_step_k : cells of the coarse grid, 1 and K; in SOC less, by its energy, with a
+        battery of more than 6 MJ, and so is the tube (`levels.LARGEST_J`)
     power_step_w : spacing of the engine power in the backward pass; the forward pass refines it
     refinement : cells of the tube in one coarse cell, along each axis. Each of these four, if
         given, takes the place of the reference's; `quick` comes with its own and allows none

@@ -24,7 +24,7 @@ def solve_dp(
     Parameters
     ----------
     cycle : the cycle driven
-    vehicle : the plant; `trip` gives the start, and the final SOC must not be below the first
+    vehicle : the plant; `trip` gives the start, and the SOC that the final one must not be below
     settings : grids, `DpSettings()` if None
     progress : called with the finished fraction, 0 to 1
     use_cache : whether to take the result from disk if it is there, and to keep it there; if

@@ -53,7 +53,7 @@ class Sweep:
             problem.demand_w,
             problem.speed_mps,
             problem.off_allowed,
-            problem.soc_init,
+            problem.soc_end,
         )
 
     def run(self, progress: Progress) -> Trajectory:

@@ -51,7 +51,7 @@ def horizon(cycle: Cycle, vehicle: Vehicle, settings: MhQpSettings, step: int) -
     demand, net = equations.demand_w(cycle), equations.net_w(cycle)
     speed = 0.5 * (cycle.speed_mps[:-1] + cycle.speed_mps[1:])
     give = np.minimum(net, vehicle.battery.power_discharge_max_w)
-    off = equations.internal_w(vehicle.trip.soc_init, give)
+    off = equations.internal_w(_mean_soc(vehicle), give)
     steps = cycle.steps
     n, length = grid.short_stages, -(-steps // grid.blocks)
     rows: list[list[float]] = []
@@ -76,6 +76,17 @@ def horizon(cycle: Cycle, vehicle: Vehicle, settings: MhQpSettings, step: int) -
     return Horizon(*np.array(rows).T)
 
 
+def _target_soc(vehicle: Vehicle) -> float:
+    """SOC to arrive with."""
+    trip = vehicle.trip
+    return trip.soc_init if trip.soc_end is None else trip.soc_end
+
+
+def _mean_soc(vehicle: Vehicle) -> float:
+    """Half way between departure and arrival, where the battery's curves are taken."""
+    return (vehicle.trip.soc_init + _target_soc(vehicle)) / 2.0
+
+
 def _kept_j(
     first: int,
     length: int,
@@ -98,7 +109,7 @@ def _kept_j(
             level -= 0.0 if t in hard else off_w[t]
             level += drained / len(hard or seconds) if not hard or t in hard else 0.0
             kept = [max(kept[0], -level), max(kept[1], level)]
-    volts = float(Equations(vehicle).voltage_v(vehicle.trip.soc_init))
+    volts = float(Equations(vehicle).voltage_v(_mean_soc(vehicle)))
     half = 0.5 * (battery.soc_max - battery.soc_min) * volts * 3600.0 * battery.capacity_ah
     return [max(min(settings.horizon.swing_share * each, half), 1.0) for each in kept]
 
@@ -276,7 +287,8 @@ def stage_program(
     count = START + starts_cost
     rows, same = _Rows(n * count), _Rows(n * count)
     cost = np.zeros(n * count)
-    energy = float(equations.voltage_v(vehicle.trip.soc_init)) * 3600.0 * battery.capacity_ah
+    energy = float(equations.voltage_v(_mean_soc(vehicle))) * 3600.0 * battery.capacity_ah
+    target = _target_soc(vehicle)
     lhv, share = equations.lhv_j_per_g, 1.0 - th.exhaust_share
     reach = state[0]
     coldest = th.t_cl_min_degc + qp.t_cl_margin_k + _heat_reserve_k(equations)
@@ -369,10 +381,13 @@ def stage_program(
         high = battery.soc_max - float(road.high_j[k]) / energy
         if road.low_j[k] > 0.0:  # a block ends: a reserve is left, half of it where cool
             part = 1.0 if t0 > th.thermostat_open_degc else 0.5
-            low += part * qp.soc_reserve * max(vehicle.trip.soc_init - battery.soc_min, 0.0)
+            lower = min(vehicle.trip.soc_init, target)
+            low += part * qp.soc_reserve * max(lower - battery.soc_min, 0.0)
         if k == n - 1:
-            low = max(qp.terminal_low * vehicle.trip.soc_init, battery.soc_min)
-            high = min(qp.terminal_high * vehicle.trip.soc_init, battery.soc_max)
+            low = max(qp.terminal_low * target, battery.soc_min)
+            high = min(qp.terminal_high * target, battery.soc_max)
+            if vehicle.trip.soc_end_at_least:
+                low, high = target, battery.soc_max
         low = min(low, reach - 1e-5 - crank_j / energy)
         if np.isfinite(high):
             rows.add("SOC max", max(high, low), {at[SOC]: 1.0})

@@ -127,7 +127,7 @@ class NlpProblem:
             rise = sigma - ca.horzcat(state[2], sigma[:-1])
             rows_of_start = [x[NlpVar.START, :] - road[6, :] * rise]
         if self.settings.soc_penalty_g:
-            cost += self.settings.soc_penalty_g * (x[NlpVar.SOC, -1] - trip.soc_init) ** 2
+            cost += self.settings.soc_penalty_g * (x[NlpVar.SOC, -1] - trip.soc_target) ** 2
         rows = ca.vertcat(
             soc_gain / UNIT[NlpVar.SOC],
             t_cl_gap,
@@ -145,7 +145,7 @@ class NlpProblem:
             "g": ca.vec(rows),
         }
         self._row_lower, self._row_upper = self._row_bounds()
-        energy_j = BatteryMaps(self.vehicle.battery).energy_j(trip.soc_init)
+        energy_j = BatteryMaps(self.vehicle.battery).energy_j(trip.soc_mean)
         least = self.vehicle.thermal.t_cl_min_degc + self.settings.t_cl_margin_k
         least += heat_reserve_k(self.vehicle, self._maps.line)
         self._floor = CoolantFloor(self.vehicle, self._maps.line, energy_j, least)
@@ -162,7 +162,7 @@ class NlpProblem:
         t_cl = 0.5 * (before[1] + x[NlpVar.T_CL])
         most_w = ca.fmin(net_w, vehicle.battery.power_discharge_max_w)
         off_w = road[3] + maps.internal_w(soc, most_w)
-        off_w -= maps.internal_w(vehicle.trip.soc_init, most_w)
+        off_w -= maps.internal_w(vehicle.trip.soc_mean, most_w)
         drawn_w = sigma * maps.internal_w(soc, net_w - power) + (1.0 - sigma) * off_w
         current = drawn_w / maps.voltage_v(soc)
         fuel = maps.alpha(t_cl) * sigma * maps.fuel_g_per_s(power)  # g/s, of the cold engine
@@ -268,16 +268,18 @@ class NlpProblem:
         """
         battery, trip, settings = self.vehicle.battery, self.vehicle.trip, self.settings
         maps = BatteryMaps(battery)
-        energy_j = maps.energy_j(trip.soc_init)
-        reserve = settings.soc_reserve * max(trip.soc_init - battery.soc_min, 0.0)
+        energy_j = maps.energy_j(trip.soc_mean)
+        reserve = settings.soc_reserve * max(trip.soc_lower_end - battery.soc_min, 0.0)
         low = np.maximum(battery.soc_min + stages.fall_j / energy_j, EMPTY)
         low += np.where(stages.fall_j > 0.0, reserve * np.where(is_hot, 1.0, COOL_SHARE), 0.0)
         high = np.minimum(battery.soc_max - stages.rise_j / energy_j, FULL)
         if not settings.soc_penalty_g:
-            low[-1] = max(settings.terminal_low * trip.soc_init, battery.soc_min)
-            high[-1] = min(settings.terminal_high * trip.soc_init, battery.soc_max)
+            low[-1] = max(settings.terminal_low * trip.soc_target, battery.soc_min)
+            high[-1] = min(settings.terminal_high * trip.soc_target, battery.soc_max)
+            if trip.soc_end_at_least:
+                low[-1], high[-1] = trip.soc_target, battery.soc_max
         most_w = self.vehicle.engine.power_max_w
         strongest = np.maximum(stages.net_w - most_w, -battery.power_charge_max_w)
-        gain = stages.duration_s * maps.internal_power_w(trip.soc_init, strongest)
+        gain = stages.duration_s * maps.internal_power_w(trip.soc_mean, strongest)
         low = np.minimum(low, soc - np.cumsum(gain) / energy_j)
         return low, np.maximum(high, low)
