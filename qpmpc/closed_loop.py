@@ -9,6 +9,7 @@ import numpy as np
 from qpmpc.controllers.base import Controller, Decision, Progress
 from qpmpc.faults.inject import Injection
 from qpmpc.faults.models import Faults
+from qpmpc.foreign_plant import ForeignPlant
 from qpmpc.results import Run, Trajectory
 from qpmpc.trip import Observation, Trip
 
@@ -22,6 +23,7 @@ def drive(
     faults: Faults | None = None,
     on_step: OnStep | None = None,
     progress: Progress | None = None,
+    plant: ForeignPlant | None = None,
 ) -> Run:
     """Drive a trip in closed loop on the nonlinear plant.
 
@@ -34,6 +36,7 @@ def drive(
         its time does not count as the controller's; observations are without faults
     progress : called as progress(steps done, steps in all); before that, if a controller takes
         long to depart, with the controller's own count
+    plant : somebody else's, made for this run; that of the trip's vehicle if None
 
     Raises
     ------
@@ -46,11 +49,11 @@ def drive(
         controller.check_ready(trip)
         injection = Injection(controller, faults)
         try:
-            run = _drive(trip, controller, injection.decide, on_step, progress)
+            run = _drive(trip, controller, injection.decide, on_step, progress, plant)
             return replace(run, remarks=(*run.remarks, *injection.remarks))
         finally:
             injection.remove()
-    return _drive(trip, controller, controller.decide, on_step, progress)
+    return _drive(trip, controller, controller.decide, on_step, progress, plant)
 
 
 def _drive(
@@ -59,9 +62,10 @@ def _drive(
     decide: Callable[[Observation], Decision],
     on_step: OnStep | None,
     progress: Progress | None,
+    foreign: ForeignPlant | None,
 ) -> Run:
     controller.begin(trip, progress)
-    plant, steps = trip.plant, trip.steps
+    plant, steps = foreign or trip.plant, trip.steps
     record = Trajectory.empty(steps)
     state = plant.initial_state()
     record.soc[0], record.t_cl_degc[0] = state.soc, state.t_cl_degc
@@ -89,13 +93,20 @@ def _drive(
             *trip.remarks,
             *controller.remarks,
             *_fallbacks(controller.name, record.fallback),
+            *_of_plant(trip, controller, foreign),
         ),
         reservations=tuple(controller.reservations),
         expects=controller.expects,
         vehicle=trip.vehicle,
         distance_km=trip.cycle.distance_m / 1e3,
         trajectory=record,
+        plant=None if foreign is None else foreign.account(),
     )
+
+
+def _of_plant(trip: Trip, controller: Controller, plant: ForeignPlant | None) -> list[str]:
+    said = () if plant is None else plant.remarks()
+    return [f"{controller.name} on {trip.cycle.name}: {line}" for line in said]
 
 
 def _fallbacks(name: str, rungs: list[str]) -> list[str]:

@@ -1,7 +1,8 @@
 """Several controllers on several cycles: run them, compare them, report."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 from typing import Any, overload
@@ -15,15 +16,22 @@ from qpmpc.controllers.settings import ControllerSettings, SettingsLike
 from qpmpc.cycles import Cycle
 from qpmpc.errors import InputError
 from qpmpc.files import check_file, json_text, write_text
-from qpmpc.registry import ControllerLike, check_controllers, make_controller
+from qpmpc.foreign_plant import ForeignCar
+from qpmpc.registry import (
+    PLANTS,
+    ControllerLike,
+    check_controllers,
+    is_of_vehicle,
+    make_controller,
+)
 from qpmpc.report.columns import COMPARE_COLUMNS, notes
 from qpmpc.report.table import print_rows
 from qpmpc.report.write import comparison_html, write_comparison
-from qpmpc.results import Run, compare_runs
+from qpmpc.results import OPTIMUM, Run, compare_runs
 from qpmpc.shown import shown
 from qpmpc.simulation import CycleLike, VehicleLike, prepared, remark_idle_settings
 from qpmpc.trip import Trip, as_trip
-from qpmpc.vehicle import Vehicle
+from qpmpc.vehicle import Vehicle, load_vehicle
 
 DEFAULT_CONTROLLERS = ("rule-based", "mh-qp-paper", "mh-qp")
 PRINTED_WIDTH = 200
@@ -107,6 +115,7 @@ def compare(
     vehicle: VehicleLike | None = None,
     *,
     settings: SettingsLike | None = None,
+    plant: str | None = None,
     next_job: Callable[[str], Progress] | None = None,
 ) -> Runs:
     """Drive every cycle with every controller, one after the other.
@@ -115,6 +124,9 @@ def compare(
     ----------
     cycles, controllers : one or several, each as `simulate` takes it
     vehicle, settings : as of `simulate`
+    plant : somebody else's that is driven in place of ours, by name: ``"fastsim"``. Controllers
+        then believe in a vehicle that is derived from it, with the engine of `vehicle` if one is
+        given; that name is also that of its own control
     next_job : called with the title of each run; returns the function that takes its progress
 
     Raises
@@ -124,7 +136,10 @@ def compare(
     """
     several = [cycles] if isinstance(cycles, str | os.PathLike | Cycle | Trip) else list(cycles)
     wanted = [controllers] if isinstance(controllers, ONE) else list(controllers)
-    check_controllers(wanted)
+    car: ForeignCar | None = None if plant is None else PLANTS.find(plant)
+    check_controllers(wanted, own=car.name if car else "")
+    if car is not None:
+        vehicle, settings = _believed(car, several, vehicle, settings)
     trips: list[Trip] = []
     chosen = ControllerSettings()
     for cycle in several:
@@ -134,7 +149,7 @@ def compare(
         trips.append(trip)
     _one_vehicle([trip.vehicle for trip in trips])
     # before any run, so that what cannot run is refused in time
-    of_first = [make_controller(what, trip, chosen) for trip in trips[:1] for what in wanted]
+    of_first = [_made(what, trip, chosen, car) for trip in trips[:1] for what in wanted]
     made_already = [what for what in wanted if isinstance(what, Controller | Planner)]
     if len(trips) > 1 and made_already:
         raise InputError(
@@ -145,10 +160,45 @@ def compare(
         for i, what in enumerate(wanted):
             name = what if isinstance(what, str) else what.name
             report = next_job(f"{trip.cycle.name}, {name}") if next_job is not None else None
-            made = of_first[i] if trip is trips[0] else make_controller(what, trip, chosen)
+            made = of_first[i] if trip is trips[0] else _made(what, trip, chosen, car)
             remark_idle_settings(made, settings, wanted)
-            runs.append(drive(trip, made, progress=report))
+            foreign = None if car is None else car.plant(trip, made)
+            run = drive(trip, made, progress=report, plant=foreign)
+            if car is not None:
+                of_car = car.remarks(trip.vehicle)
+                if made.name == OPTIMUM:
+                    of_car.append(f"{OPTIMUM} is the optimum of {trip.vehicle.name}, replayed on "
+                                  f"the plant {car.name}: no bound there")  # fmt: skip
+                run = replace(run, remarks=(*of_car, *run.remarks))
+            runs.append(run)
     return Runs(runs, chosen)
+
+
+def _made(
+    what: ControllerLike, trip: Trip, settings: ControllerSettings, car: ForeignCar | None
+) -> Controller:
+    if car is not None and what == car.name:
+        return car.own_control(trip)
+    return make_controller(what, trip, settings)
+
+
+def _believed(
+    car: ForeignCar,
+    cycles: Sequence[CycleLike],
+    engine_of: VehicleLike | None,
+    settings: SettingsLike | None,
+) -> tuple[Vehicle, SettingsLike | None]:
+    """Return what controllers believe of a foreign car, and the settings that are left."""
+    if any(isinstance(cycle, Trip) for cycle in cycles):
+        raise InputError(f"a Trip has its vehicle: with the plant {car.name!r} give its cycle")
+    of_vehicle: dict[str, object] = {}
+    left = settings
+    if isinstance(settings, Mapping):
+        of_vehicle = {key: value for key, value in settings.items() if is_of_vehicle(key)}
+        left = {key: value for key, value in settings.items() if key not in of_vehicle}
+    if engine_of is not None and not isinstance(engine_of, Vehicle):
+        engine_of = load_vehicle(engine_of)
+    return car.vehicle(engine_of, of_vehicle), left
 
 
 def _one_vehicle(vehicles: Sequence[Vehicle]) -> None:

@@ -1,7 +1,7 @@
 """The top layer: every name that a user can type, and its target.
 
-Another package adds controllers, planners, solvers, vehicles, cycles and checks by entry points,
-see `Names`; ``docs/extending.md`` shows how.
+Another package adds controllers, planners, solvers, vehicles, cycles, checks and plants by entry
+points, see `Names`; ``docs/extending.md`` shows how.
 """
 
 import inspect
@@ -61,7 +61,12 @@ CHECKS = Names(
         )
     },
 )
-TABLES = (CONTROLLERS, PLANNERS, SOLVERS, VEHICLES, CYCLES, CHECKS)
+# Each leads to a `ForeignCar`, whose own control has the same name among the controllers.
+PLANTS = Names(
+    "plant",
+    {"fastsim": Shipped("qpmpc.verification.fastsim.car:FASTSIM", "fastsim", "fastsim")},
+)
+TABLES = (CONTROLLERS, PLANNERS, SOLVERS, VEHICLES, CYCLES, CHECKS, PLANTS)
 
 ControllerLike = str | type[Controller] | type[Planner] | Controller | Planner
 
@@ -71,8 +76,13 @@ def controller_names() -> tuple[str, ...]:
     return (*CONTROLLERS.names(), *PLANNERS.names())
 
 
-def check_controllers(controllers: Sequence[ControllerLike]) -> None:
+def check_controllers(controllers: Sequence[ControllerLike], own: str = "") -> None:
     """Check that each controller can run here, before any time is spent.
+
+    Parameters
+    ----------
+    controllers : to be checked
+    own : name of a foreign plant's own control, if there is one
 
     Raises
     ------
@@ -90,7 +100,8 @@ def check_controllers(controllers: Sequence[ControllerLike]) -> None:
             )
         name = what if isinstance(what, str) else getattr(what, "name", repr(what))
         if isinstance(what, str):
-            _table_of(name).check(name)
+            if name != own:
+                _table_of(name).check(name)
         elif name in shipped and not _kind(what).__module__.startswith("qpmpc."):
             raise InputError(f"controller {name!r}: this name is that of a shipped one")
         if name in names:
@@ -164,6 +175,11 @@ def _table_of(name: str) -> Names:
     for table in (CONTROLLERS, PLANNERS):
         if name in table:
             return table
+    if name in PLANTS:
+        raise InputError(
+            f"controller {name!r} is what the plant of that name comes with: "
+            f"qpmpc compare .. --plant {name}"
+        )
     raise InputError(unknown("controller", name, controller_names()))
 
 
@@ -182,15 +198,16 @@ def split_settings(
     InputError
         If the first part of a name is neither, or a controller's setting is not allowed.
     """
-    of_vehicle = {
-        key: value
-        for key, value in settings.items()
-        if key.partition(".")[0] in Vehicle.model_fields and "." in key
-    }
+    of_vehicle = {key: value for key, value in settings.items() if is_of_vehicle(key)}
     of_controllers = {key: value for key, value in settings.items() if key not in of_vehicle}
     chosen = ControllerSettings().with_settings(of_controllers)
     check_sections(chosen, controllers)
     return of_vehicle, chosen
+
+
+def is_of_vehicle(key: str) -> bool:
+    """Whether a dotted setting is one of the vehicle."""
+    return key.partition(".")[0] in Vehicle.model_fields and "." in key
 
 
 def check_sections(
@@ -260,6 +277,7 @@ _READS = {
     "rule-based": ("rule_based",),
     "ecms": ("ecms", "rule_based"),
     "dp": ("dp",),
+    "fastsim": (),
 }
 _SCALARS = {"name", "description", "base"}
 

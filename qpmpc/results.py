@@ -93,6 +93,7 @@ class Run:
     vehicle : parameters, overrides included
     trajectory : second by second
     faults : what injected faults did, as plain data; see `qpmpc.faults.effects`
+    plant : what a foreign plant did not obey, as plain data; None on the vehicle's own plant
     reservations : why its controller says that its fuel cannot be compared
     expects : what its controller expected at departure
     """
@@ -106,6 +107,7 @@ class Run:
     distance_km: float
     trajectory: Trajectory
     faults: dict[str, Any] | None = None
+    plant: dict[str, Any] | None = None
     reservations: tuple[str, ...] = ()
     expects: Expectation | None = None
 
@@ -268,6 +270,7 @@ class Run:
             "soc_end_at_least": self.vehicle.trip.soc_end_at_least,
             "battery_used_kwh": self.battery_used_j / J_PER_KWH,
             **({} if self.faults is None else {"faults": self.faults}),
+            **({} if self.plant is None else {"plant": self.plant}),
         }
 
 
@@ -290,7 +293,8 @@ def compare_runs(runs: Sequence[Run]) -> list[dict[str, Any]]:
     saving_vs_rule_percent = 100 (1 - m / m_rule),   fuel_above_dp_percent = 100 (m / m_dp - 1)
 
     with m the SOC-balanced fuel. Null where there is no such run on the cycle, or it burns
-    nothing. `comparable` of a run tells whether its own m can be trusted (see `Run`).
+    nothing. `comparable` of a run tells whether its own m can be trusted (see `Run`). On a foreign
+    plant there is also saving_vs_own_control_percent, with the run of that plant's own control.
     """
     balanced = {(run.cycle, run.controller): run.fuel_soc_balanced_g for run in runs}
 
@@ -302,11 +306,17 @@ def compare_runs(runs: Sequence[Run]) -> list[dict[str, Any]]:
             if balanced.get((run.cycle, other), 0.0) > 0.0
         }
         rule, optimum = share.get(REFERENCE), share.get(OPTIMUM)
+        against_own = {}
+        if run.plant is not None:
+            own_g = balanced.get((run.cycle, run.plant["name"]), 0.0)
+            percent = 100.0 * (1.0 - run.fuel_soc_balanced_g / own_g) if own_g > 0.0 else None
+            against_own["saving_vs_own_control_percent"] = percent
         rows.append(
             {
                 **run.summary(),
                 "saving_vs_rule_percent": None if rule is None else 100.0 * (1.0 - rule),
                 "fuel_above_dp_percent": None if optimum is None else 100.0 * (optimum - 1.0),
+                **against_own,
             }
         )
     return rows

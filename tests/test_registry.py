@@ -36,6 +36,7 @@ def test_tables_are_of_one_kind_each() -> None:
         "vehicle",
         "cycle",
         "check",
+        "plant",
     ]
 
 

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from qpmpc.cli.options import JsonOption, OutOption, SetOption, VehicleOption
+from qpmpc.cli.options import JsonOption, OptionalVehicleOption, OutOption, PlantOption, SetOption
 
 DEFAULT_CONTROLLERS = "rule-based,mh-qp-paper,mh-qp"
 
@@ -22,7 +22,8 @@ def compare(
         str,
         typer.Option(metavar="NAME,NAME,...", help="Such as mh-nlp, dp; a wrong name lists all."),
     ] = DEFAULT_CONTROLLERS,
-    vehicle: VehicleOption = "prius-nimh",
+    vehicle: OptionalVehicleOption = None,
+    plant: PlantOption = None,
     set_: SetOption = None,
     json_file: JsonOption = None,
     out: OutOption = None,
@@ -38,21 +39,25 @@ def compare(
       qpmpc compare my_trip.csv --controllers rule-based,mh-qp,dp --json -
 
       qpmpc compare nycc --vehicle my_car.toml --set trip.soc_init=0.55
+
+      qpmpc compare nycc --plant fastsim --controllers fastsim,rule-based,mh-qp
     """
     from qpmpc.cli.console import progress_bar, result_console, write_json
     from qpmpc.cli.inputs import check_outputs
     from qpmpc.comparison import compare as run
-    from qpmpc.registry import check_controllers
+    from qpmpc.registry import PLANTS, check_controllers
     from qpmpc.report.columns import COMPARE_COLUMNS
     from qpmpc.report.table import print_rows
     from qpmpc.settings import parse_settings
 
     names = [name.strip() for name in controllers.split(",")]
-    check_controllers(names)
+    if plant is not None:
+        PLANTS.check(plant)
+    check_controllers(names, own=plant or "")
     settings = parse_settings(set_ or [])
     check_outputs(json_file, out)
     with progress_bar(len(cycles) * len(names)) as bar:
-        runs = run(cycles, names, vehicle, settings=settings, next_job=bar.next_job)
+        runs = run(cycles, names, vehicle, settings=settings, plant=plant, next_job=bar.next_job)
     rows = runs.rows()
     write_json({"runs": rows}, json_file)
     remarks = runs.remarks()

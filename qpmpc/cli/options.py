@@ -23,6 +23,27 @@ VehicleOption = Annotated[
         "complete or with a base.",
     ),
 ]
+OptionalVehicleOption = Annotated[
+    str | None,
+    typer.Option(
+        "--vehicle",
+        metavar="NAME|FILE.toml",
+        help="A shipped vehicle (see [b]qpmpc vehicles[/b]) or a TOML file, "
+        "complete or with a base.",
+        show_default="prius-nimh",
+    ),
+]
+PlantOption = Annotated[
+    str | None,
+    typer.Option(
+        "--plant",
+        metavar="NAME",
+        help="Drive somebody else's plant in place of ours: fastsim, whose own control is then the "
+        "controller fastsim. Controllers believe in a car derived from it; --vehicle gives them "
+        "another engine's fuel.",
+        show_default=False,
+    ),
+]
 SetOption = Annotated[
     list[str] | None,
     typer.Option(

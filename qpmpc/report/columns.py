@@ -29,8 +29,9 @@ def number(value: float | None, digits: int) -> str:
 
 def _marked(row: Row, key: str, digits: int) -> str:
     """Number, if there is one, with the mark of runs that are not comparable."""
-    text = number(row[key], digits)
-    return text if row["comparable"] or row[key] is None else text + NOT_COMPARABLE
+    value = row.get(key)
+    text = number(value, digits)
+    return text if row["comparable"] or value is None else text + NOT_COMPARABLE
 
 
 def _range(low: float, high: float, digits: int) -> str:
@@ -70,6 +71,7 @@ FUEL = (
 )
 AGAINST = (
     Column("saving %", lambda row: _marked(row, "saving_vs_rule_percent", 2)),
+    Column("saving vs own %", lambda row: _marked(row, "saving_vs_own_control_percent", 2)),
     Column("above DP %", lambda row: _marked(row, "fuel_above_dp_percent", 2)),
 )
 STATE = (
@@ -96,6 +98,11 @@ def filled(columns: Sequence[Column], rows: Sequence[Row]) -> list[Column]:
     return [column for column in columns if any(column.text(row) != NONE for row in rows)]
 
 
+def _references(row: Row) -> tuple[str, ...]:
+    """Controllers that percentages of a row refer to."""
+    return ("rule-based", "dp", *([row["plant"]["name"]] if "plant" in row else []))
+
+
 def notes(rows: Sequence[Row]) -> list[str]:
     """Sentences that explain the marks in a table of these rows."""
     found = []
@@ -104,6 +111,6 @@ def notes(rows: Sequence[Row]) -> list[str]:
             f"{NOT_COMPARABLE} not comparable: final SOC too far from the initial one, a limit "
             "exceeded, or mostly on fallbacks; the remarks say which"
         )
-    if any(not r["comparable"] and r["controller"] in ("rule-based", "dp") for r in rows):
+    if any(not r["comparable"] and r["controller"] in _references(r) for r in rows):
         found.append("  percentages against such a run are no more certain than the run itself")
     return found

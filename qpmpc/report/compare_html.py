@@ -41,6 +41,7 @@ def compare_html(
         "qpmpc.report",
         "compare.html.j2",
         vehicle=vehicle,
+        plant=runs[0].plant["name"] if runs[0].plant else "",
         columns=columns,
         rows=rows,
         marks=notes(rows),
@@ -99,7 +100,7 @@ def _remarks(rows: Sequence[Row], settings: ControllerSettings) -> list[str]:
                 "The SOC reference of the rules was chosen for each trip, knowing it, so that the "
                 "trip ends as nearly as possible at the SOC asked for."
             )
-    if OPTIMUM in present:
+    if OPTIMUM in present and not any("plant" in row for row in rows):
         remarks.append(
             "dp is dynamic programming: it knows the whole trip and the plant itself, could not "
             "run in a car, and has no time per step."

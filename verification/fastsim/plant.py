@@ -1,0 +1,143 @@
+"""FASTSim's Prius on one trip, with the interface of our own plant."""
+
+from typing import Any
+
+import numpy as np
+
+from qpmpc.trip import Trip
+from qpmpc.vehicle import Command, PlantState, StepFlows
+from qpmpc.vehicle.plant import LONG_AGO_S, POWER_TOLERANCE_W
+from qpmpc.verification.fastsim.one_second import SecondBySecond, Tree, component
+
+
+class FastsimPlant:
+    """FASTSim's Prius, driven second by second along a trip.
+
+    Parameters
+    ----------
+    trip : its cycle is driven
+    soc_init : at departure
+    obeys : whether commands are carried out, or FASTSim's own control drives
+    """
+
+    def __init__(self, trip: Trip, soc_init: float, obeys: bool) -> None:
+        self._cycle, self._vehicle = trip.cycle, trip.vehicle
+        self._soc_init, self._obeys = soc_init, obeys
+        self._car = SecondBySecond(soc_init, float(trip.cycle.speed_mps[0]))
+        self._seconds = 0
+        self._eta_regen = trip.vehicle.chassis.eta_regen
+        # of each second
+        self._off_w: list[float] = []
+        self._switched: list[bool] = []
+        self._missing_w: list[float] = []
+        self._slow_mps: list[float] = []
+        self._demand_off_w: list[float] = []
+
+    def initial_state(self) -> PlantState:
+        """Return the state at departure, engine off."""
+        return PlantState(self._soc_init, self._vehicle.trip.t_cl_init_degc)
+
+    def step(
+        self, state: PlantState, command: Command, demand_w: float, speed_mps: float
+    ) -> tuple[PlantState, StepFlows]:
+        """Drive the next second of the trip in FASTSim.
+
+        FASTSim computes the road load and knows the speed: `demand_w` is compared with its own.
+        Flows of heat are 0: it has none.
+
+        Parameters
+        ----------
+        state : as returned of the second before
+        command : to the engine
+        demand_w, speed_mps : as controllers see them
+        """
+        k = self._seconds
+        wanted_mps = float(self._cycle.speed_mps[k + 1])
+        grade = float(self._cycle.step_grade[k])
+        car = self._car.drive(wanted_mps, grade, command if self._obeys else None)
+        self._seconds += 1
+        engine, battery = component(car, "fc")["state"], component(car, "res")["state"]
+        on, p_eng_w = bool(engine["fc_on"]), float(engine["pwr_prop_watts"])
+        off_w = abs(p_eng_w - command.p_eng_w) if self._obeys else 0.0
+        missing_w = self._note(car, command, off_w, demand_w, wanted_mps)
+        following = PlantState(
+            float(battery["soc"]),
+            state.t_cl_degc,
+            on,
+            min(state.engine_for_s + 1, LONG_AGO_S) if on == state.engine_on else 1,
+            p_eng_w,
+        )
+        flows = StepFlows(
+            fuel_g=engine["pwr_fuel_watts"] / self._vehicle.engine.lhv_j_per_g,
+            fuel_w=engine["pwr_fuel_watts"],
+            p_eng_w=p_eng_w,
+            p_bat_w=battery["pwr_out_electrical_watts"],
+            cranking_w=0.0,
+            internal_w=battery["pwr_out_chemical_watts"],
+            p_friction_w=car["state"]["pwr_brake_watts"] * self._eta_regen,
+            p_missing_w=missing_w,
+            exhaust_w=0.0,
+            air_w=0.0,
+            radiator_w=0.0,
+            cabin_w=0.0,
+            boiling_w=0.0,
+            coolant_w=0.0,
+            started=on and not state.engine_on,
+            power_excess_w=off_w if off_w > POWER_TOLERANCE_W else 0.0,
+        )
+        return following, flows
+
+    def _note(
+        self, car: Tree, command: Command, off_w: float, demand_w: float, wanted_mps: float
+    ) -> float:
+        """Keep what the second shows of obedience; returns the power that the wheels lacked."""
+        state, engine = car["state"], component(car, "fc")["state"]
+        lacked_w = float(state["pwr_tractive_for_cyc_watts"] - state["pwr_tractive_watts"])
+        missing_w = max(lacked_w, 0.0)
+        slow_mps = wanted_mps - state["speed_ach_meters_per_second"]
+        self._off_w.append(off_w)
+        self._switched.append(self._obeys and bool(engine["fc_on"]) != bool(command.engine_on))
+        self._missing_w.append(missing_w)
+        self._slow_mps.append(slow_mps)
+        if not any(self._slow_mps[-2:]):  # else FASTSim drives at other speeds
+            friction_w = state["pwr_brake_watts"] * self._eta_regen
+            own_w = component(car, "transmission")["state"]["pwr_in_watts"] - friction_w
+            self._demand_off_w.append(abs(demand_w - own_w))
+        return missing_w
+
+    def account(self) -> dict[str, Any]:
+        """Return what FASTSim did not obey; see docs/fastsim.md for the keys."""
+        disobeyed = [
+            off > POWER_TOLERANCE_W or other
+            for off, other in zip(self._off_w, self._switched, strict=True)
+        ]
+        return {
+            "name": "fastsim",
+            "obeys": self._obeys,
+            "seconds_not_obeyed": sum(disobeyed),
+            "seconds_switched_otherwise": sum(self._switched),
+            "power_off_max_w": max(self._off_w, default=0.0),
+            "energy_off_j": sum(self._off_w),
+            "seconds_behind_trace": int(np.count_nonzero(np.array(self._slow_mps) > 0.0)),
+            "speed_behind_max_mps": max(0.0, *self._slow_mps),
+            "energy_missing_j": sum(self._missing_w),
+            "demand_off_max_w": max(self._demand_off_w, default=0.0),
+        }
+
+    def remarks(self) -> tuple[str, ...]:
+        """Say in a line each what was not obeyed, and where the car fell behind."""
+        found, said = self.account(), []
+        if found["seconds_not_obeyed"]:
+            said.append(
+                f"FASTSim did not obey in {found['seconds_not_obeyed']} of {self._seconds} s: "
+                f"engine power off by {found['power_off_max_w']:.3g} W at most, "
+                f"{found['energy_off_j'] / 1e3:.3g} kJ in all, on or off otherwise in "
+                f"{found['seconds_switched_otherwise']} s"
+            )
+        if found["seconds_behind_trace"]:
+            said.append(
+                f"FASTSim's car was too slow in {found['seconds_behind_trace']} of "
+                f"{self._seconds} s, by {found['speed_behind_max_mps']:.3g} m/s at most: the wheels"
+                f" lacked {found['energy_missing_j'] / 1e3:.3g} kJ"
+            )
+        return tuple(said)

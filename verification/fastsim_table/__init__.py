@@ -1,0 +1,1 @@
+"""Every cycle on FASTSim's Prius: the table of docs/fastsim.md."""

@@ -1,0 +1,76 @@
+"""``python -m qpmpc.verification.fastsim_table [PAGE]``: write the table of docs/fastsim.md anew.
+
+Every cycle on FASTSim's plant, with both engines.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from qpmpc.comparison import compare
+from qpmpc.errors import InputError
+from qpmpc.files import write_text
+
+BEGIN = "<!-- fastsim: written by python -m qpmpc.verification.fastsim_table -->"
+END = "<!-- end -->"
+
+CYCLES = ("udds", "hwfet", "wltc-3b", "nycc")
+OWN = "fastsim"
+ENGINE_OF = "prius-nimh"  # whose map is not FASTSim's
+# Controllers, the car that gives their engine if not FASTSim, settings, and what a row is called.
+ROWS: tuple[tuple[tuple[str, ...], str | None, dict[str, object], str], ...] = (
+    ((OWN, "rule-based", "ecms", "mh-qp", "dp"), None, {}, "{}"),
+    (("rule-based", "mh-qp"), ENGINE_OF, {}, f"{{}}, engine of {ENGINE_OF}"),
+    (("mh-qp",), None, {"engine.min_on_s": 0}, "{}, engine free to stop"),
+)
+DP_GRID = {"dp.grid": "quick"}  # ten times as fast, and off by less than what is at stake here
+
+Rows = list[tuple[str, dict[str, Any]]]
+
+
+def measured(cycles: Sequence[str] = CYCLES) -> Rows:
+    """Drive all; return a label and the figures of each run, cycle by cycle."""
+    found: Rows = []
+    for controllers, engine_of, settings, label in ROWS:
+        chosen = settings | (DP_GRID if "dp" in controllers else {})
+        runs = compare(cycles, controllers, engine_of, settings=chosen, plant=OWN)
+        found += [(label.format(row["controller"]), row) for row in runs.rows()]
+    return sorted(found, key=lambda pair: list(cycles).index(pair[1]["cycle"]))
+
+
+def table(rows: Rows) -> str:
+    """Return the rows as a Markdown table."""
+    own = {row["cycle"]: row["fuel_soc_balanced_g"] for _, row in rows if row["controller"] == OWN}
+    text = (
+        "| cycle | controller | balanced g | below FASTSim's own % | SOC | starts | not obeyed s |"
+    )
+    text += " behind trace s |\n|---|---|---:|---:|---:|---:|---:|---:|\n"
+    for label, row in rows:
+        fuel_g, cycle = row["fuel_soc_balanced_g"], row["cycle"]
+        mark = "" if row["comparable"] else "\\*"
+        plant = row["plant"]
+        text += (
+            f"| {cycle} | {label} | {fuel_g:.1f}{mark} | {100 * (1 - fuel_g / own[cycle]):.1f} "
+            f"| {row['soc_min']:.3f}..{row['soc_max']:.3f} | {row['engine_starts']} "
+            f"| {plant['seconds_not_obeyed']} | {plant['seconds_behind_trace']} |\n"
+        )
+    return text
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Write the table between the marks of a page; see the module."""
+    parser = argparse.ArgumentParser(prog="python -m qpmpc.verification.fastsim_table")
+    parser.add_argument("page", type=Path, nargs="?", default=Path("docs/fastsim.md"))
+    page = parser.parse_args(arguments).page
+    text = page.read_text("utf-8")
+    if not 0 <= text.find(BEGIN) < text.find(END):
+        raise InputError(f"{page}: no marks {BEGIN} and {END}")
+    before, after = text.partition(BEGIN)[0], text.partition(END)[2]
+    write_text(page, f"{before}{BEGIN}\n\n{table(measured())}\n{END}{after}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
