@@ -95,7 +95,10 @@ def _drive(
             *_fallbacks(controller.name, record.fallback),
             *_of_plant(trip, controller, foreign),
         ),
-        reservations=tuple(controller.reservations),
+        reservations=(
+            *controller.reservations,
+            *(() if foreign is None else foreign.reservations()),
+        ),
         expects=controller.expects,
         vehicle=trip.vehicle,
         distance_km=trip.cycle.distance_m / 1e3,

@@ -32,6 +32,9 @@ class ForeignPlant(Protocol):
     def remarks(self) -> tuple[str, ...]:
         """Return the same in lines."""
 
+    def reservations(self) -> tuple[str, ...]:
+        """Return why the fuel of this run cannot be compared with that of others, if so."""
+
 
 class ForeignCar(Protocol):
     """A foreign car: the target of a name in `qpmpc.registry.PLANTS`.

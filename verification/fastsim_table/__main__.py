@@ -46,7 +46,7 @@ def table(rows: Rows) -> str:
     text = (
         "| cycle | controller | balanced g | below FASTSim's own % | SOC | starts | not obeyed s |"
     )
-    text += " behind trace s |\n|---|---|---:|---:|---:|---:|---:|---:|\n"
+    text += " off trace s |\n|---|---|---:|---:|---:|---:|---:|---:|\n"
     for label, row in rows:
         fuel_g, cycle = row["fuel_soc_balanced_g"], row["cycle"]
         mark = "" if row["comparable"] else "\\*"
@@ -54,7 +54,7 @@ def table(rows: Rows) -> str:
         text += (
             f"| {cycle} | {label} | {fuel_g:.1f}{mark} | {100 * (1 - fuel_g / own[cycle]):.1f} "
             f"| {row['soc_min']:.3f}..{row['soc_max']:.3f} | {row['engine_starts']} "
-            f"| {plant['seconds_not_obeyed']} | {plant['seconds_behind_trace']} |\n"
+            f"| {plant['seconds_not_obeyed']} | {plant['seconds_off_trace']} |\n"
         )
     return text
 
