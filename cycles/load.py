@@ -5,7 +5,7 @@ from pathlib import Path
 
 from qpmpc.cycles.catalogue import catalogue
 from qpmpc.cycles.cycle import Cycle
-from qpmpc.cycles.read_csv import read_csv
+from qpmpc.cycles.read_drive import read_drive
 from qpmpc.cycles.shipped import shipped_cycle
 from qpmpc.cycles.trips import ALLOWED, is_trip, looks_like_trip, make_trip
 from qpmpc.errors import InputError
@@ -22,7 +22,7 @@ CYCLES = Names(
 def load_cycle(name_or_path: str | os.PathLike[str]) -> Cycle:
     """Load a shipped cycle or a trip by its name, or a user's CSV file by its path.
 
-    The columns of a CSV file are ``time_s,speed_mps[,grade]``; see `read_csv`.
+    The columns of a CSV file are ``time_s,speed_mps[,grade]``; see `read_drive`.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def load_cycle(name_or_path: str | os.PathLike[str]) -> Cycle:
             return shipped_cycle(entry)
     if name in CYCLES:
         found = CYCLES.find(name)
-        return found if isinstance(found, Cycle) else read_csv(Path(found), name=name)
+        return found if isinstance(found, Cycle) else read_drive(Path(found), name=name)
     if is_trip(name):
         return make_trip(name)
     path = Path(name)
@@ -50,4 +50,4 @@ def load_cycle(name_or_path: str | os.PathLike[str]) -> Cycle:
         if looks_like_trip(name):
             make_trip(name)  # says what is wrong with it
         raise InputError(CYCLES.unknown(name))
-    return read_csv(path)
+    return read_drive(path)

@@ -4,9 +4,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from qpmpc.cycles.cycle import Cycle, Floats
 from qpmpc.errors import InputError
+
+Flags = NDArray[np.bool_]
 
 SPEED_MAX_MPS = 70.0
 """252 km/h: far beyond any car of the kind modelled here."""
@@ -67,8 +70,19 @@ MOVING_SPEED_MEAN_MAX_MPS = 50.0
 TO_MPS = "to get m/s, divide km/h by 3.6 or multiply mph by 0.44704"
 
 
+def is_gap(time_s: Floats, speed_mps: Floats) -> Flags:
+    """Whether the time from each sample to the next is too long to fill; shape (m-1,)."""
+    standing = np.maximum(speed_mps[:-1], speed_mps[1:]) <= STANDING_MPS
+    return np.diff(time_s) > np.where(standing, GAP_STANDING_MAX_S, GAP_MAX_S)
+
+
 def check_samples(
-    path: Path, lines: Sequence[int], time_s: Floats, speed_mps: Floats, grade: Floats
+    path: Path,
+    lines: Sequence[int],
+    time_s: Floats,
+    speed_mps: Floats,
+    grade: Floats,
+    row: str = "line",
 ) -> None:
     """Check the ranges of the samples and the order of time.
 
@@ -78,6 +92,8 @@ def check_samples(
         For the message: the file and the line of each sample.
     time_s, speed_mps, grade
         Finite samples of the file. Shape (m,), m >= 2.
+    row
+        What the file calls a line.
 
     Raises
     ------
@@ -85,41 +101,58 @@ def check_samples(
         At the first sample that is out of range.
     """
     step_s = np.diff(time_s)
-    _refuse(path, lines[1:], step_s <= 0, time_s[1:], "time_s is {:.10g}, must increase strictly")
-    _refuse(path, lines, speed_mps < 0, speed_mps, "speed_mps is {:g}, must not be negative")
-    _refuse(
-        path,
-        lines,
+
+    def refuse(first: int, bad: Flags, values: Floats, message: str) -> None:
+        _refuse(path, row, lines[first:], bad, values, message)
+
+    refuse(1, step_s <= 0, time_s[1:], "time_s is {:.10g}, must increase strictly")
+    refuse(0, speed_mps < 0, speed_mps, "speed_mps is {:g}, must not be negative")
+    refuse(
+        0,
         speed_mps > SPEED_MAX_MPS,
         speed_mps,
         f"speed_mps is {{:g}}, must be 0 to {SPEED_MAX_MPS:g} m/s; {TO_MPS}",
     )
-    _refuse(
-        path,
-        lines,
-        np.abs(grade) > GRADE_MAX,
-        grade,
-        f"grade is {{:g}}, must be -{GRADE_MAX:g} to {GRADE_MAX:g}, rise over run: "
-        "divide percent by 100",
-    )
+    check_grade(path, lines, grade, row, "rise over run: divide percent by 100")
     duration_s = time_s[-1] - time_s[0]
     if not DURATION_MIN_S <= duration_s <= DURATION_MAX_S:
         raise InputError(
             f"{path}: the trip lasts {duration_s:g} s, must be {DURATION_MIN_S:g} s to 24 h"
         )
-    standing = np.maximum(speed_mps[:-1], speed_mps[1:]) <= STANDING_MPS
-    _refuse(
-        path,
-        lines[1:],
-        step_s > np.where(standing, GAP_STANDING_MAX_S, GAP_MAX_S),
+    refuse(
+        1,
+        is_gap(time_s, speed_mps),
         step_s,
         f"{{:g}} s without a sample, at most {GAP_MAX_S:g} s are allowed, "
         f"{GAP_STANDING_MAX_S:g} s standing: the motion in between is not known; if these are two "
-        "trips, make a file of each",
+        "trips, qpmpc convert --split makes a file of each",
     )
 
 
-def check_motion(path: Path, lines: Sequence[int], time_s: Floats, cycle: Cycle) -> None:
+def check_grade(path: Path, lines: Sequence[int], grade: Floats, row: str, why: str) -> None:
+    """Check that no sample is steeper than `GRADE_MAX`.
+
+    Parameters
+    ----------
+    path, lines, row
+        For the message, as of `check_samples`.
+    grade
+        Rise over run. Shape (m,).
+    why
+        How that may have come.
+
+    Raises
+    ------
+    InputError
+        At the first sample that is.
+    """
+    message = f"grade is {{:.3g}}, must be -{GRADE_MAX:g} to {GRADE_MAX:g}, {why}"
+    _refuse(path, row, lines, np.abs(grade) > GRADE_MAX, grade, message)
+
+
+def check_motion(
+    path: Path, lines: Sequence[int], time_s: Floats, cycle: Cycle, row: str = "line"
+) -> None:
     """Check that a road vehicle can move like this; catches most speeds in km/h or mph.
 
     It cannot catch all: a calm town trip in mph is a plausible brisk trip in m/s.
@@ -130,6 +163,8 @@ def check_motion(path: Path, lines: Sequence[int], time_s: Floats, cycle: Cycle)
         For the message: the file, and line and time of each sample. Shape (m,).
     cycle
         The drive at 1 Hz: noise between its points is ignored.
+    row
+        What the file calls a line.
 
     Raises
     ------
@@ -158,7 +193,7 @@ def check_motion(path: Path, lines: Sequence[int], time_s: Floats, cycle: Cycle)
         last = int(np.searchsorted(time_s - time_s[0], k, side="right"))
         line = lines[min(last, len(lines) - 1)]
         raise InputError(
-            f"{path}, line {line}: the speed changes by {accel[k]:.1f} m/s in a second, at most "
+            f"{path}, {row} {line}: the speed changes by {accel[k]:.1f} m/s in a second, at most "
             f"{ACCEL_MAX_MPS2:g} are allowed; a wrong sample, or a wrong unit: {TO_MPS}"
         )
 
@@ -185,13 +220,9 @@ def check_road(path: Path, cycle: Cycle) -> None:
 
 
 def _refuse(
-    path: Path,
-    lines: Sequence[int],
-    bad: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
-    values: Floats,
-    message: str,
+    path: Path, row: str, lines: Sequence[int], bad: Flags, values: Floats, message: str
 ) -> None:
     """Raise at the first bad sample; `message` has a placeholder for its value."""
     if np.any(bad):
         k = int(np.argmax(bad))
-        raise InputError(f"{path}, line {lines[k]}: {message.format(values[k])}")
+        raise InputError(f"{path}, {row} {lines[k]}: {message.format(values[k])}")

@@ -97,7 +97,7 @@ def header_names(text: str) -> list[str]:
     if len(lines) < 2:
         return []
     try:
-        return [_named(title)[0] for title in _cells(Path(), *lines[0], _separator(lines))]
+        return [split_title(title)[0] for title in _cells(Path(), *lines[0], _separator(lines))]
     except InputError:
         return []
 
@@ -124,12 +124,12 @@ def parse_delimited(path: Path, text: str) -> DelimitedTable:
         header.pop()
     if len(header) != len(set(header)) or not all(header):
         raise InputError(f"{path}, line {rows[0][0]}: each column needs a name of its own")
-    named = [_named(title) for title in header]
+    named = [split_title(title) for title in header]
     decimal_comma = separator != ","
     units = rows[1][1]
     if len(units) == len(header) and all(_is_unit(cell, decimal_comma) for cell in units):
         named = [
-            (name, inside or _plain_unit(below.strip("[]()")))
+            (name, inside or plain_unit(below.strip("[]()")))
             for (name, inside), below in zip(named, units, strict=True)
         ]
         rows = rows[1:]
@@ -176,13 +176,15 @@ def _of_width(path: Path, number: int, cells: list[str], width: int) -> list[str
     return cells
 
 
-def _named(title: str) -> tuple[str, str]:
+def split_title(title: str) -> tuple[str, str]:
+    """Return `Column.name` and the unit in brackets or after a comma, empty where there is none."""
     found = next((match for form in _UNIT_IN_TITLE if (match := form.match(title))), None)
     name, unit = (found["name"], found["unit"]) if found else (title, "")
-    return re.sub(r"[^0-9a-z%/]+", "_", name.lower()).strip("_"), _plain_unit(unit)
+    return re.sub(r"[^0-9a-z%/]+", "_", name.lower()).strip("_"), plain_unit(unit)
 
 
-def _plain_unit(unit: str) -> str:
+def plain_unit(unit: str) -> str:
+    """Return a unit as in `Column.unit`."""
     return re.sub(r"[\s()]", "", unit).replace("·", "*").lower()
 
 

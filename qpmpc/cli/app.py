@@ -11,6 +11,7 @@ from qpmpc._version import __version__
 from qpmpc.cli.benchmark import benchmark
 from qpmpc.cli.codegen import codegen
 from qpmpc.cli.compare import compare
+from qpmpc.cli.convert import convert
 from qpmpc.cli.cycles import cycles
 from qpmpc.cli.pil import pil
 from qpmpc.cli.reproduce import reproduce
@@ -46,6 +47,7 @@ app.command()(verify)
 app.command()(sweep)
 app.command()(studies)
 app.command()(report)
+app.command()(convert)
 app.command()(cycles)
 app.command()(trips)
 app.command()(vehicles)

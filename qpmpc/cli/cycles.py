@@ -55,6 +55,8 @@ def cycles(
         text = getattr(entry, title)
         if text:
             console.print(f"{title}: {text}")
+    for remark in cycle.remarks:
+        console.print(remark)
     if out is not None:
         for remark in write_cycle(cycle, out):
             console.print(remark)

@@ -93,7 +93,7 @@ def _one_run(
         result = processor_in_the_loop(trip, settings, precision, report, algorithm)
     write_json(result.summary(), json_file)
     console = result_console(json_file)
-    for line in pil_lines(result):
+    for line in (*pil_lines(result), *trip.remarks):
         console.print(line)
     if out is not None:
         for remark in write_pil(result, out):
@@ -117,6 +117,8 @@ def _pareto(
     write_json(found.as_data(), json_file)
     console = result_console(json_file)
     console.print(pareto_table(found.rows()))
+    for remark in trip.remarks:
+        console.print(remark)
     if out is not None:
         for remark in write_pareto(found, out):
             console.print(remark)

@@ -28,6 +28,7 @@ FIGURES = (
     _column("steepest %", "grade_max_percent", 1),
     _column("climb m/km", "climb_m_per_km", 1),
 )
+CYCLE_COLUMNS = (Column("cycle", lambda row: row["name"], is_name=True), *FIGURES)
 TRIP_COLUMNS = (
     Column("cycle", lambda row: row["name"], is_name=True),
     Column("type", lambda row: row.get("type", "-"), is_name=True),

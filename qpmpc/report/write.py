@@ -7,6 +7,7 @@ from typing import Any
 
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle
+from qpmpc.cycles.read_drive import Drive
 from qpmpc.errors import InputError
 from qpmpc.files import json_text, write_bytes, write_text
 from qpmpc.report.columns import Row
@@ -105,6 +106,18 @@ def write_cycle(cycle: Cycle, folder: Path) -> list[str]:
 
     file = folder / f"cycle_{cycle.name}.png"
     return _write_picture(file, draw) or [f"{file} written"]
+
+
+def write_drive(drive: Drive, file: Path) -> list[str]:
+    """Write a drive as CSV, and a picture beside it; returns remarks."""
+
+    def draw() -> bytes:
+        from qpmpc.report.drive_picture import draw_drive
+
+        return draw_drive(drive)
+
+    write_text(file, cycle_csv(drive.cycle))
+    return [f"{file} written", *_write_picture(file.with_suffix(".png"), draw)]
 
 
 def write_trips(trips: Sequence[Cycle], folder: Path) -> list[str]:

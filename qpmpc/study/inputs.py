@@ -12,6 +12,7 @@ from qpmpc.errors import InputError
 from qpmpc.faults.models import Faults, load_faults
 from qpmpc.preview.forecast_errors import MODELS
 from qpmpc.registry import check_controllers, split_settings
+from qpmpc.remarks import say_once
 from qpmpc.study.definition import OF_RUN, TRUE_FORECAST, Study, with_seed
 from qpmpc.vehicle import Vehicle, load_vehicle
 from qpmpc.vehicle.names import DEFAULT_VEHICLE, VEHICLES
@@ -80,6 +81,8 @@ def read_inputs(study: Study) -> Inputs:
             cycles[name] = load_cycle(name)
         elif not name.startswith(tuple(SETS)):
             make_trip(name)  # refuses a wrong duration
+    for remark in (remark for cycle in cycles.values() for remark in cycle.remarks):
+        say_once(remark)
     for forecast in study.values_of("forecast"):
         if forecast not in (TRUE_FORECAST, *MODELS):
             raise InputError(

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from qpmpc.cycles import Cycle, cycle_names, load_cycle
+from qpmpc.cycles.logs.read import MEGABYTES_MAX
 from qpmpc.cycles.plausibility import GAP_MAX_S, GAP_STANDING_MAX_S
-from qpmpc.cycles.read_csv import MEGABYTES_MAX
 from qpmpc.errors import InputError
 
 Write = Callable[[str | bytes], Path]
@@ -217,7 +217,7 @@ def test_longer_gaps_are_refused_with_the_way_out(write: Write, rows: str, gap: 
     refused(
         write(HEADER + rows),
         f"{gap} without a sample, at most {GAP_MAX_S:g} s are allowed, {GAP_STANDING_MAX_S:g} s "
-        "standing: .*if these are two trips, make a file of each",
+        "standing: .*if these are two trips, qpmpc convert --split makes a file of each",
     )
 
 

@@ -1,0 +1,35 @@
+"""A file of any format as one `LogColumns`."""
+
+from pathlib import Path
+
+from qpmpc.cycles.logs.columns import LogColumns
+from qpmpc.cycles.logs.gpx import read_gpx
+from qpmpc.cycles.logs.mdf import read_mdf
+from qpmpc.cycles.logs.plain import is_plain, parse_plain
+from qpmpc.cycles.logs.quantities import LogOptions
+from qpmpc.cycles.logs.table import is_log, parse_log
+from qpmpc.input_text import read_text
+
+MEGABYTES_MAX = 64
+"""24 h at 25 samples a second."""
+
+GPX, MDF = (".gpx",), (".mf4", ".mdf")
+"""Suffixes; all other files are tables."""
+
+
+def read_log(path: Path, options: LogOptions) -> LogColumns:
+    """Read a log or schedule, by its suffix.
+
+    Raises
+    ------
+    InputError
+        One line that names the file, the place and what is allowed.
+    """
+    if path.suffix.lower() in GPX:
+        return read_gpx(path, MEGABYTES_MAX, options)
+    if path.suffix.lower() in MDF:
+        return read_mdf(path, options)
+    text = read_text(path, MEGABYTES_MAX)
+    if options.stated() or (is_log(text) and not is_plain(text)):
+        return parse_log(path, text, options)
+    return parse_plain(path, text)
