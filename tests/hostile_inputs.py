@@ -5,7 +5,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+import numpy as np
+from asammdf import MDF, Signal
 from hypothesis import strategies as st
 
 from qpmpc.cycles import load_cycle
@@ -81,6 +84,15 @@ CYCLE = "time_s,speed_mps,grade\n" + "".join(
 LOG = "Logger X\nTime;Vehicle Speed [km/h];Grade;RPM\ns;km/h;%;1/min\n" + "".join(
     f"{k},0;{3 * min(k, 40 - k, 12)},5;{1 if k > 20 else 0};{800 + k}\n" for k in range(41)
 )
+GPX = """<?xml version="1.0" encoding="UTF-8"?>
+<gpx version="1.1" creator="x" xmlns="http://www.topografix.com/GPX/1/1">
+<trk><trkseg>
+""" + "".join(
+    f'<trkpt lat="{50 + k / 1e4:.5f}" lon="7.0"><ele>{100 + k}</ele>\n'
+    f"<time>2026-01-01T00:00:{k:02}Z</time>\n"
+    f"<extensions><speed>{11.1}</speed></extensions></trkpt>\n"
+    for k in range(40)
+) + "</trkseg></trk></gpx>\n"  # fmt: skip
 ENGINE = "Speed [rpm],Torque [Nm],BSFC [g/kWh]\n" + "".join(
     f"{n},{t},{220 + 3000 / t + n / 100}\n" for n in (1000, 2000, 3000) for t in (10, 40, 80, 110)
 )
@@ -132,6 +144,27 @@ def os_text(content: bytes) -> str:
     return content.decode("utf-8", "surrogateescape")
 
 
+def _measurement() -> bytes:
+    """A small MDF 4 with speed and elevation."""
+    time = np.arange(41.0)
+    channels = [
+        Signal(3.6 * np.clip(np.minimum(time, 40 - time), 0, 12), time, name="Speed", unit="km/h"),
+        Signal(100 + time, time, name="Altitude", unit="m"),
+    ]
+    with TemporaryDirectory() as folder, MDF() as file:
+        file.append(channels)
+        return file.save(Path(folder) / "a.mf4").read_bytes()
+
+
+@st.composite
+def changed_bytes(draw: st.DrawFn, good: bytes) -> bytes:
+    """A good file with some bytes of other values, or cut."""
+    content = bytearray(good)
+    for _ in range(draw(st.integers(0, 4))):
+        content[draw(st.integers(0, len(good) - 1))] = draw(st.integers(0, 255))
+    return bytes(content[: draw(st.just(len(good)) | st.integers(0, len(good)))])
+
+
 def _load_settings(_: Path, texts: list[str]) -> None:
     of_vehicle, _settings = split_settings(parse_settings(texts))
     VEHICLE.with_settings(of_vehicle)
@@ -170,5 +203,9 @@ LOADERS: dict[str, Loader] = {
     ),
     "settings": Loader(settings_texts(), _load_settings),
     "log": Loader(edited(LOG, ";") | st.binary(max_size=200), _file("log.csv", load_cycle)),
+    "gpx": Loader(edited(GPX, ">") | st.binary(max_size=200), _file("trip.gpx", load_cycle)),
+    "mdf": Loader(
+        changed_bytes(_measurement()) | st.binary(max_size=200), _file("trip.mf4", load_cycle)
+    ),
     "engine": Loader(edited(ENGINE, ",") | st.binary(max_size=200), _file("map.csv", _load_map)),
 }

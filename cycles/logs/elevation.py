@@ -39,7 +39,7 @@ def filtered_elevation(log: LogColumns) -> tuple[Floats, Floats, Floats]:
     Returns
     -------
     way_m : of each sample, shape (m,)
-    places_m : `SPACING_M` apart, shape (n,)
+    places_m : `SPACING_M` apart, from the first elevation to the last, shape (n,)
     elevation_m : filtered, at these places, shape (n,)
     """
     speed, time, raw_m = log.speed_mps, log.time_s, log.elevation_m
@@ -53,7 +53,7 @@ def filtered_elevation(log: LogColumns) -> tuple[Floats, Floats, Floats]:
     filled = np.flatnonzero(number)
     mean_m = np.bincount(cell, raw_m[known])[filled] / number[filled]
     at_m = np.bincount(cell, way_m[known])[filled] / number[filled]
-    places_m = np.arange(0.0, way_m[-1] + SPACING_M, SPACING_M)
+    places_m = np.arange(at_m[0], at_m[-1] + 1e-9, SPACING_M)
     return way_m, places_m, smoothed(np.interp(places_m, at_m, mean_m), SMOOTH_M / SPACING_M)
 
 
@@ -66,11 +66,13 @@ def with_grade(log: LogColumns) -> LogColumns:
     if len(known) < 2:
         return _with(log, flat, Said(ASSUMED, "a level road: the elevation has no values"))
     way_m, places_m, height_m = filtered_elevation(log)
-    if way_m[-1] < WAY_MIN_M:
-        why = f"a level road: {way_m[-1]:.0f} m are too short for a grade from elevation"
+    length_m = places_m[-1] - places_m[0]
+    if length_m < WAY_MIN_M:
+        why = f"a level road: {length_m:.0f} m are too short for a grade from elevation"
         return _with(log, flat, Said(ASSUMED, why))
     middle_m = (places_m[:-1] + places_m[1:]) / 2
-    grade = np.interp(way_m, middle_m, np.diff(height_m) / SPACING_M)
+    beyond = (way_m < places_m[0] - SPACING_M) | (way_m > places_m[-1] + 2.0 * SPACING_M)
+    grade = np.where(beyond, 0.0, np.interp(way_m, middle_m, np.diff(height_m) / SPACING_M))
     before, after = _climb_m(known), _climb_m(height_m)
     text = (
         f"grade from elevation: Gaussian filter over {SMOOTH_M:.0f} m of way, rise over run; of "
@@ -79,7 +81,12 @@ def with_grade(log: LogColumns) -> LogColumns:
     missing = len(log.time_s) - len(known)
     said = [Said(READ, text)]
     if missing:
-        said.append(Said(ASSUMED, f"elevation between its neighbours in {missing} rows"))
+        said.append(
+            Said(
+                ASSUMED,
+                f"elevation missing in {missing} rows: between its neighbours, level beyond",
+            )
+        )
     return _with(log, grade, *said)
 
 

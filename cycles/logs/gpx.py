@@ -18,6 +18,8 @@ from qpmpc.problems import shown_value
 AGREE = 0.1
 """Largest difference in distance between recorded speeds and positions, else these are used."""
 
+NAMESPACES_MAX = 100
+
 _DECLARATION = re.compile(r"^\s*<\?xml[^>]*\?>")
 
 
@@ -69,6 +71,8 @@ def _points(path: Path, text: str) -> list[tuple[int, int, Any]]:
     """Points with times: their numbers, the number of the track, and gpxpy's point."""
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise InputError(f"{path}: declares a document type or entities: not read, GPX has none")
+    if text.count("xmlns") > NAMESPACES_MAX:  # gpxpy takes the square of their number in time
+        raise InputError(f"{path}: more than {NAMESPACES_MAX} namespaces: not read")
     import gpxpy
 
     try:

@@ -1,7 +1,11 @@
 """Measurement files of the automotive industry (ASAM MDF 3 and 4): channels as columns."""
 
+import gc
+import logging
 import re
+import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -57,15 +61,31 @@ def read_mdf(path: Path, options: LogOptions) -> LogColumns:
     _check_file(path)
     from asammdf import MDF
 
+    with _quiet():
+        try:
+            with MDF(path) as file:
+                return _read(path, file, options)
+        except InputError:
+            raise
+        except Exception as error:  # of asammdf: the file is another's bytes
+            failure = shown_value(str(error))
+        gc.collect()
+    raise InputError(f"{path}: not an MDF file that asammdf reads: {failure}")
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep asammdf's own lines about a broken file from stderr, and those of its destructor.
+
+    That fails on what its constructor had not made.
+    """
+    logger, hook = logging.getLogger("asammdf"), sys.unraisablehook
+    disabled = logger.disabled
+    sys.unraisablehook, logger.disabled = (lambda _: None), True
     try:
-        with MDF(path) as file:
-            return _read(path, file, options)
-    except InputError:
-        raise
-    except Exception as error:  # of asammdf: the file is another's bytes
-        raise InputError(
-            f"{path}: not an MDF file that asammdf reads: {shown_value(str(error))}"
-        ) from None
+        yield
+    finally:
+        sys.unraisablehook, logger.disabled = hook, disabled
 
 
 def _check_file(path: Path) -> None:
@@ -161,7 +181,12 @@ def _samples(
     """Times and values that are numbers, in SI units."""
     title = shown_value(channel.column.title)
     scale, unit = scale_of(path, channel.column, quantity, options)
-    signal = file.get(channel.column.title, group=channel.group, index=channel.index)
+    signal = file.get(
+        channel.column.title,
+        group=channel.group,
+        index=channel.index,
+        ignore_invalidation_bits=True,  # else such samples would be missing without a word
+    )
     if signal.samples.ndim != 1 or not np.issubdtype(signal.samples.dtype, np.number):
         raise InputError(f"{path}: channel {title} is no number over time")
     values = signal.samples.astype(np.float64)

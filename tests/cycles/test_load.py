@@ -252,7 +252,7 @@ def test_short_sprint_passes_with_a_remark(write: Write) -> None:
     cycle = load_cycle(write(HEADER + rows))
     assert cycle.distance_m > 500
     (remark,) = cycle.remarks
-    assert "226 W/kg accelerating (above 28), 5 m/s^2 (above 3.5), 5 m/s^3 (above 4)" in remark
+    assert "226 W/kg accelerating (above 26), 238 W/kg braking (above 45), 5 m/s^2" in remark
 
 
 def test_steady_motorway_in_mph_is_noticed(write: Write) -> None:

@@ -37,8 +37,11 @@ def shares(factor: float, part_s: int, every_s: int) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("part_s", PARTS_S)
-def test_every_part_of_a_genuine_drive_passes_in_silence(part_s):
-    assert shares(1.0, part_s, every_s=1)["silent"] == 1.0
+def test_nearly_every_part_of_a_genuine_drive_passes_in_silence(part_s):
+    """At most 2 % are mentioned: those that creep are slow for a car."""
+    found = shares(1.0, part_s, every_s=7)
+    assert found["silent"] >= 0.98
+    assert found["refused"] == 0.0
     assert all(suspicions(load_cycle(name)) == [] for name in cycle_names())
 
 
@@ -46,15 +49,39 @@ def test_every_part_of_a_genuine_drive_passes_in_silence(part_s):
     ("unit", "silent"),
     [
         # at most, of parts of 60, 120 and 300 s
-        ("km/h", (0.03, 0.01, 0.0)),
-        ("mph", (0.20, 0.04, 0.0)),
-        ("knots", (0.42, 0.33, 0.16)),
+        ("km/h", (0.005, 0.0, 0.0)),
+        ("mph", (0.05, 0.005, 0.0)),
+        ("knots", (0.14, 0.04, 0.005)),
     ],
 )
 def test_few_parts_pass_in_a_wrong_unit(unit, silent):
     """Speed alone let 64, 56 and 9 % pass in km/h; a slow, calm part has no other sign."""
     for part_s, most in zip(PARTS_S, silent, strict=True):
-        assert shares(WRONG[unit], part_s, every_s=7)["silent"] <= most
+        assert shares(WRONG[unit], part_s, every_s=10)["silent"] <= most
+
+
+@pytest.mark.parametrize(("unit", "silent"), [("km/h", (0.5, 0.2)), ("mph", (0.55, 0.27))])
+def test_speeds_too_low_are_noticed_at_their_stops(unit, silent):
+    """As m/s or mph that are declared km/h; parts without a stop have no sign."""
+    for part_s, most in zip((60, 300), silent, strict=True):
+        assert shares(1.0 / WRONG[unit], part_s, every_s=10)["silent"] <= most
+    assert all(
+        suspicions(Cycle("slow", cycle.time_s, cycle.speed_mps / WRONG[unit], cycle.grade))
+        for cycle in map(load_cycle, cycle_names())
+    )
+
+
+@pytest.mark.parametrize("hertz", [0.5, 5.0])
+def test_at_other_rates_of_sampling(hertz):
+    """Parts of 60 s in mph, sampled at another rate: about as at 1 Hz."""
+    silent = []
+    for name in cycle_names():
+        whole = WRONG["mph"] * load_cycle(name).speed_mps
+        for k in range(0, len(whole) - 60, 20):
+            time = np.arange(0.0, 60.1, 1.0 / hertz)
+            speed = np.interp(time, np.arange(61.0), whole[k : k + 61])
+            silent.append(outcome(Cycle.from_samples("part", time, speed)) == "silent")
+    assert np.mean(silent) <= 0.07
 
 
 def sprint(seconds: float) -> Cycle:
