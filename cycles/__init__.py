@@ -1,4 +1,4 @@
-"""Drive cycles: the shipped ones with their sources, and import of users' CSV files."""
+"""Drive cycles: the shipped ones with their sources, and import of users' files."""
 
 from qpmpc.cycles.catalogue import CatalogueEntry, Figure, Published, catalogue, cycle_names
 from qpmpc.cycles.cycle import Cycle

@@ -15,14 +15,15 @@ from qpmpc.names import Names, Shipped
 CYCLES = Names(
     "cycle",
     {entry.name: Shipped(entry.data) for entry in catalogue()},
-    also=f", a trip ({ALLOWED}), or a CSV file",
+    also=f", a trip ({ALLOWED}), or a file (CSV, GPX, MDF)",
 )
 
 
 def load_cycle(name_or_path: str | os.PathLike[str]) -> Cycle:
-    """Load a shipped cycle or a trip by its name, or a user's CSV file by its path.
+    """Load a shipped cycle or a trip by its name, or a user's file by its path.
 
-    The columns of a CSV file are ``time_s,speed_mps[,grade]``; see `read_drive`.
+    A table has ``time_s,speed_mps[,grade]`` or the columns of a log; GPX and MDF are known by their
+    suffixes; see `read_drive`. What was assumed about a file is in the cycle's `remarks`.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ TIME = Quantity(
     "time",
     (
         "time", "t", "test_time", "elapsed_time", "timestamp", "cycsecs", "device_time",
-        "gps_time",
+        "gps_time", "datetime", "date_time", "unix_time", "epoch",
     ),
     {"s": 1.0, "sec": 1.0, "secs": 1.0, "seconds": 1.0, "ms": 1e-3, "min": 60.0},
     {"cycsecs": 1.0},

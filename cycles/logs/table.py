@@ -1,6 +1,6 @@
 """Logs in text files: columns under their own names and in their own units."""
 
-from datetime import UTC, datetime
+from datetime import UTC, datetime, time
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +29,12 @@ OURS = ("time_s", "speed_mps", "grade", "elevation_m")  # of whose units nothing
 TRIPS = ("trip", "trip_id", "tripid", "trip_no")
 VEHICLES = ("vehid", "veh_id", "vehicle_id", "vehicleid")
 
-DATES = ("%d-%b-%Y %H:%M:%S.%f", "%d-%b-%Y %H:%M:%S", "%a %b %d %H:%M:%S GMT%z %Y")
+DATES = (
+    "%d-%b-%Y %H:%M:%S.%f", "%d-%b-%Y %H:%M:%S", "%a %b %d %H:%M:%S GMT%z %Y",
+    "%d.%m.%Y %H:%M:%S", "%d.%m.%Y %H:%M:%S.%f", "%Y/%m/%d %H:%M:%S",
+)  # fmt: skip
+
+DAY_S = 86400.0
 
 
 def is_log(text: str) -> bool:
@@ -140,23 +145,40 @@ def _time_s(table: DelimitedTable, column: Column, options: LogOptions, said: li
             f"{table.path}: {TIME.option}: {shown_value(column.title)} has no numbers but "
             f"{shown_value(first)}"
         )
-    said.append(Said(READ, f"time from {shown_value(column.title)}, as dates"))
     seconds = np.full(len(table.lines), np.nan)
+    of_day = _of_day(first) is not None
+    how = "times of day" if of_day else "dates"
+    said.append(Said(READ, f"time from {shown_value(column.title)}, as {how}"))
     for k, cell in enumerate(column.cells):
         if cell.lower() in ABSENT:
             continue
-        date = _date(cell)
-        if date is None:
+        found = _of_day(cell) if of_day else _date(cell)
+        if found is None:
             raise InputError(
                 f"{table.path}, line {table.lines[k]}: {shown_value(column.title)} is "
                 f"{shown_value(cell)}, must be a number or a date, e.g. 2026-01-31T08:00:00"
             )
-        seconds[k] = date.timestamp()
+        seconds[k] = found
+    if of_day:
+        known = np.flatnonzero(np.isfinite(seconds))
+        midnights = np.cumsum(np.diff(seconds[known], prepend=seconds[known[0]]) < -DAY_S / 2)
+        seconds[known] += DAY_S * midnights
     return seconds
 
 
-def _date(cell: str) -> datetime | None:
-    """Read a date; one without a zone counts from an arbitrary one."""
+def _of_day(cell: str) -> float | None:
+    """Seconds since midnight, from a time such as 23:59:59.5."""
+    try:
+        found = time.fromisoformat(cell)
+    except ValueError:
+        return None
+    if ":" not in cell:
+        return None
+    return 3600.0 * found.hour + 60.0 * found.minute + found.second + 1e-6 * found.microsecond
+
+
+def _date(cell: str) -> float | None:
+    """Seconds of a date; one without a zone counts from an arbitrary one."""
     try:
         found = datetime.fromisoformat(cell)
     except ValueError:
@@ -169,4 +191,4 @@ def _date(cell: str) -> datetime | None:
                 continue
     if found is not None and found.tzinfo is None:
         found = found.replace(tzinfo=UTC)
-    return found
+    return None if found is None else found.timestamp()

@@ -14,7 +14,7 @@ def compare(
         list[str],
         typer.Argument(
             metavar="CYCLE...",
-            help="Shipped cycles (see [b]qpmpc cycles[/b]) or CSV files.",
+            help="Shipped cycles (see [b]qpmpc cycles[/b]), trips or files (CSV, GPX, MDF).",
             show_default=False,
         ),
     ],

@@ -9,8 +9,9 @@ CycleArgument = Annotated[
     str,
     typer.Argument(
         metavar="CYCLE",
-        help="A shipped cycle (see [b]qpmpc cycles[/b]), a trip (see [b]qpmpc trips[/b]) or a CSV "
-        "file with time_s,speed_mps[dim],grade[/dim], or a log with units in its header.",
+        help="A shipped cycle (see [b]qpmpc cycles[/b]), a trip (see [b]qpmpc trips[/b]) or a "
+        "file: CSV with time_s,speed_mps[dim],grade[/dim], or a log with units of its own, GPX, "
+        "MDF.",
         show_default=False,
     ),
 ]

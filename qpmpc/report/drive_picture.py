@@ -7,7 +7,7 @@ from qpmpc.cycles.logs.elevation import filtered_elevation
 from qpmpc.cycles.read_drive import Drive
 from qpmpc.report.style import BLACK, GREEN, SKY, png, tidy
 
-SAMPLE = {"linestyle": "", "marker": ".", "markersize": 3.0, "color": SKY}
+SAMPLE = {"linestyle": "", "marker": "o", "markersize": 3.5, "color": SKY}
 
 
 def draw_drive(drive: Drive) -> bytes:
@@ -36,7 +36,7 @@ def draw_drive(drive: Drive) -> bytes:
         axes.plot(elapsed_s, log.elevation_m, **SAMPLE)
         axes.plot(elapsed_s, np.interp(way_m, places_m, height_m), color=BLACK, label="filtered")
         axes.set_ylabel("elevation\nm")
-        axes.legend(loc="upper right", fontsize=8, frameon=False)
+        axes.legend(fontsize=8, frameon=False)
     if hilly:
         others[0].plot(cycle.time_s, 100 * cycle.grade, color=GREEN)
         others[0].set_ylabel("grade\n%")

@@ -36,11 +36,22 @@ FILES = {
     + rows(lambda k, v: f"{k},{v},0,0"),
     "ISO dates": "time_s,speed_mps\n"
     + rows(lambda k, v: f"{(BEGIN + timedelta(seconds=k)).isoformat()},{v}"),
+    "dates with points": "Datetime;Speed [km/h]\n"
+    + rows(
+        lambda k, v: f"{BEGIN + timedelta(seconds=k):%d.%m.%Y %H:%M:%S};"
+        + repr(v * 3.6).replace(".", ",")
+    ),
+    "times of day, over midnight": "Time,Speed [km/h]\n"
+    + rows(lambda k, v: f"{BEGIN + timedelta(seconds=k):%H:%M:%S.0},{v * 3.6!r}"),
+    "epochs": "timestamp [ms],speed_mps\n"
+    + rows(lambda k, v: f"{1769900000123 + 1000 * k},{v}"),
     "an OBD logger": "GPS Time,Device Time,Speed (OBD)(km/h)\n"
     + rows(
         lambda k, v: f"x,{BEGIN + timedelta(seconds=k):%d-%b-%Y %H:%M:%S}.120,"
         + ("-" if k in (5, 9) else repr(v * 3.6))
     ),
+    "vehicle energy data": "DayNum,VehId,Trip,Timestamp(ms),Vehicle Speed[km/h],OAT[DegC]\n"
+    + rows(lambda k, v: f"1.5,8,706,{1000 * k},{v * 3.6!r},NaN"),
     "10 Hz": "time_s;speed_mps\n"
     + "".join(f"{k / 10};{float(np.interp(k / 10, range(17), SPEED_MPS))!r}\n" for k in range(161)),
     "noise while standing": "time_s,speed_mps\n"
