@@ -239,6 +239,15 @@ def test_shipped_studies_can_be_run(name: str) -> None:
     assert [run.run for run in islice(made.runs(), 3)] == [0, 1, 2]
 
 
+def test_what_was_assumed_about_a_log_is_said(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    log = tmp_path / "said_by_a_study.csv"
+    log.write_text("t_s,speed_kmh\n" + "".join(f"{k},{3 * k}\n" for k in range(9)))
+    read_inputs(study(fixed={"cycle": str(log), "controller": "rule-based"}))
+    assert f"{log}: speed from 'speed_kmh', in kmh" in caplog.messages
+
+
 def test_an_unknown_study_is_refused() -> None:
     with pytest.raises(InputError, match="weather"):
         load_study("weathr")
