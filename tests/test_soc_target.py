@@ -12,6 +12,7 @@ from qpmpc.trip import Trip
 from qpmpc.vehicle import Vehicle, load_vehicle
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.verification.bounds.lower_bound import lower_bound
+from qpmpc.verification.dynamic_programming import DpSettings, solve_dp
 
 EMPTIER = {"trip.soc_init": 0.6, "trip.soc_end": 0.5}
 FULLER = {"trip.soc_init": 0.55, "trip.soc_end": 0.65}
@@ -147,3 +148,14 @@ def test_the_rules_are_forced_on_near_the_lower_limit_of_any_battery():
 def test_a_target_beyond_the_limits_is_refused(soc_end):
     with pytest.raises(InputError, match=r"trip\.soc_end must lie between battery\.soc_min"):
         car(trip__soc_end=soc_end)
+
+
+def test_the_costate_at_departure_is_the_price_of_the_final_soc(short):
+    """The optimum's slope over the SOC asked for, by central difference; NYCC: 0.1 to 0.4 % off."""
+    quick = DpSettings.quick()
+    best = solve_dp(short, car("paper-nimh"), quick)
+    less, more = (
+        solve_dp(short, car("paper-nimh", trip__soc_end=soc_end), quick).fuel_total_g
+        for soc_end in (0.58, 0.62)
+    )
+    assert float(best.soc_costate_g[0]) == pytest.approx((more - less) / 0.04, rel=0.02)

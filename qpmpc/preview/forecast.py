@@ -32,7 +32,7 @@ class Trace:
     @classmethod
     def of(cls, cycle: Cycle, vehicle: Vehicle) -> "Trace":
         """Compute the demand and speed trace of a cycle."""
-        return cls(demand_w(cycle, vehicle.chassis), cycle.step_speed_mps)
+        return cls(demand_w(cycle, vehicle), cycle.step_speed_mps)
 
     def battery_side_w(self, vehicle: Vehicle) -> NDArray[np.float64]:
         """Net power asked of engine and battery, P0 = P_d + P_aux, W, shape (steps,).

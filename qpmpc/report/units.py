@@ -10,6 +10,8 @@ _UNITS = {
     "j_per_k": "J/K",
     "kg_per_l": "kg/L",
     "kj_per_rev_l": "kJ/(rev L)",
+    "per_k": "1/K",
+    "mps": "m/s",
     "rpm": "1/min",
     "nm": "N m",
     "ohm": "Ω",

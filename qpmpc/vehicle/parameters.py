@@ -45,6 +45,9 @@ SPEED_MAX_MPS = 70.0  # at which forces and losses are checked
 class Chassis(Section):
     """Road load F = A + B v + C v^2 + m k dv/dt + m g grade, and driveline efficiencies.
 
+    `road_load_share_per_k` is by how much A, B and C grow per K below 24 degC. Regeneration fades
+    out between `regen_full_mps` and `regen_from_mps`; it does not where both are 0.
+
     From the smallest city car to a truck of 10 t. B may be negative, as some fits to coast-downs
     have it, but the road may push the car at no speed.
     """
@@ -56,6 +59,9 @@ class Chassis(Section):
     road_load_c_n_per_mps2: Annotated[float, Field(ge=0.0, le=20.0)]  # c_d A of 33 m^2
     eta_drive: Annotated[float, Field(ge=0.1, le=1.0)]
     eta_regen: Annotated[float, Field(ge=0.0, le=1.0)]
+    road_load_share_per_k: Annotated[float, Field(ge=0.0, le=0.02)] = 0.0  # air alone: 0.4 %
+    regen_from_mps: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
+    regen_full_mps: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -67,6 +73,8 @@ class Chassis(Section):
                 f"road_load_b_n_per_mps must not make the road load negative: it is {least:.3g} N "
                 f"at {lowest_at:.3g} m/s"
             )
+        if self.regen_from_mps > 0.0 and self.regen_full_mps <= self.regen_from_mps:
+            raise ValueError("regen_full_mps must be above regen_from_mps")
         return self
 
 

@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.vehicle import Command, Plant, PlantState, demand_w, load_vehicle
+from qpmpc.vehicle.demand import tractive_force_n
 from qpmpc.vehicle.plant import BOILING_DEGC, LONG_AGO_S
+from qpmpc.verification.independent.equations import Equations
 
 PLANT = Plant(load_vehicle())
 STARTING = Plant(
@@ -176,23 +178,62 @@ def test_the_plant_counts_the_seconds_since_the_engine_started_or_stopped():
 
 
 def test_demand_at_constant_speed_is_the_road_load():
-    chassis = load_vehicle().chassis
     v = np.full(11, 20.0)
     cycle = Cycle("constant", np.arange(11.0), v, np.zeros(11))
     force = 81.278 + 2.93982 * 20.0 + 0.307004 * 400.0
-    np.testing.assert_allclose(demand_w(cycle, chassis), force * 20.0 / 0.88, rtol=1e-12)
+    np.testing.assert_allclose(demand_w(cycle, load_vehicle()), force * 20.0 / 0.88, rtol=1e-12)
 
 
 @pytest.mark.parametrize(("name", "mean_kw"), [("nycc", 0.96), ("nedc-truncated", 4.01)])
 def test_mean_demand_of_the_winter_cycles(name, mean_kw):
-    mean = demand_w(load_cycle(name), load_vehicle().chassis).mean() / 1e3
+    mean = demand_w(load_cycle(name), load_vehicle()).mean() / 1e3
     assert mean == pytest.approx(mean_kw, abs=0.006)  # rounding of the published figure
 
 
+def test_road_load_in_the_cold_is_that_of_the_cold_test():
+    """EPA's coefficients of the 2016 Prius at -7 C, from those at 24 C and the share per K."""
+    cold = load_vehicle().with_settings({"chassis.road_load_share_per_k": 0.00358})
+    speed, level = np.array([5.0, 15.0, 30.0]), np.zeros(3)
+    force = tractive_force_n(cold.chassis, -7.0, speed, level, level)
+    epa = 90.308 + 3.26639 * speed + 0.341127 * speed**2
+    np.testing.assert_allclose(force, epa, rtol=5e-4)  # the three factors differ by as much
+    warm = tractive_force_n(cold.chassis, 30.0, speed, level, level)
+    np.testing.assert_allclose(
+        warm, tractive_force_n(cold.chassis, 24.0, speed, level, level), rtol=1e-12
+    )
+
+
+def test_friction_brakes_take_over_at_low_speed():
+    blended = load_vehicle().with_settings(
+        {"chassis.regen_from_mps": 1.0, "chassis.regen_full_mps": 3.0}
+    )
+    speed = np.arange(10.0, -0.1, -1.0)  # mean speeds 9.5 .. 0.5
+    cycle = Cycle("stop", np.arange(11.0), speed, np.zeros(11))
+    whole, part = demand_w(cycle, load_vehicle()), demand_w(cycle, blended)
+    mean = cycle.step_speed_mps
+    np.testing.assert_array_equal(part[mean >= 3.0], whole[mean >= 3.0])
+    np.testing.assert_allclose(part[mean == 1.5], 0.25 * whole[mean == 1.5])
+    assert np.all(part[mean <= 1.0] == 0.0)
+    speeding_up = Cycle("go", np.arange(11.0), speed[::-1].copy(), np.zeros(11))
+    np.testing.assert_array_equal(
+        demand_w(speeding_up, load_vehicle()), demand_w(speeding_up, blended)
+    )
+
+
+@pytest.mark.parametrize("name", ["sonata-hybrid", "prius-prime"])
+def test_the_independent_equations_ask_for_the_same_power(name):
+    vehicle = load_vehicle(name)
+    cycle = load_cycle("nycc")
+    np.testing.assert_allclose(
+        Equations(vehicle).demand_w(cycle), demand_w(cycle, vehicle), rtol=1e-9, atol=1e-6
+    )
+
+
 def test_climbing_costs_the_potential_energy():
-    chassis = load_vehicle().chassis
+    vehicle = load_vehicle()
+    chassis = vehicle.chassis
     flat = Cycle("flat", np.arange(11.0), np.full(11, 15.0), np.zeros(11))
     hill = Cycle("hill", np.arange(11.0), np.full(11, 15.0), np.full(11, 0.05))
-    extra_w = (demand_w(hill, chassis) - demand_w(flat, chassis)) * chassis.eta_drive
+    extra_w = (demand_w(hill, vehicle) - demand_w(flat, vehicle)) * chassis.eta_drive
     climb_mps = 15.0 * 0.05 / math.sqrt(1.0 + 0.05**2)
     np.testing.assert_allclose(extra_w, chassis.mass_kg * 9.81 * climb_mps, rtol=1e-9)

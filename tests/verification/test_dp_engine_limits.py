@@ -42,7 +42,7 @@ def replay(
 ) -> tuple[PlantState, list[StepFlows]]:
     """Last state and all flows of commands."""
     state, flows = plant.initial_state(), []
-    demand = demand_w(cycle, plant.vehicle.chassis).tolist()
+    demand = demand_w(cycle, plant.vehicle).tolist()
     road = zip(demand, cycle.step_speed_mps, strict=True)
     for on, power_w, (demand, speed) in zip(engine_on, p_eng_w, road, strict=True):
         state, flow = plant.step(state, Command(on, power_w), demand, float(speed))
@@ -165,7 +165,7 @@ def test_exhaustive_search_finds_nothing_better(limits: dict[str, float]) -> Non
     engine, soc_init, plant = vehicle.engine, vehicle.trip.soc_init, Plant(vehicle)
     speed = np.array([13.5, 14.0, 14.5, 15.0, 14.0, 11.0])
     cycle = Cycle.from_samples("burst", np.arange(6), speed)
-    demand = demand_w(cycle, vehicle.chassis)
+    demand = demand_w(cycle, vehicle)
     best = np.inf
     for pattern in product((False, True), repeat=5):
         runs, rests = lengths(list(pattern))
@@ -238,7 +238,7 @@ def test_cranking_comes_from_the_battery(piece: Cycle) -> None:
     cranking_w = np.array([flow.cranking_w for flow in flows])
     np.testing.assert_array_equal(cranking_w, 3500.0 * starts)
     given_w = np.array([flow.p_bat_w - flow.p_friction_w for flow in flows])
-    net_w = demand_w(piece, vehicle.chassis) + vehicle.battery.aux_power_w
+    net_w = demand_w(piece, vehicle) + vehicle.battery.aux_power_w
     np.testing.assert_allclose(given_w, net_w + cranking_w - solution.p_eng_w, atol=1e-6)
     assert state.soc == solution.soc[-1] >= vehicle.trip.soc_init - 1e-9
     assert max(flow.power_excess_w for flow in flows) == 0.0

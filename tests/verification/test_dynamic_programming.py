@@ -69,7 +69,7 @@ def replay(
     """States, fuel and greatest power excess of commands on a fresh plant."""
     plant = plant_of(vehicle)
     states, fuel, excess = [plant.initial_state()], 0.0, 0.0
-    demand = demand_w(cycle, vehicle.chassis)
+    demand = demand_w(cycle, vehicle)
     for k, (on, power) in enumerate(zip(engine_on, p_eng_w, strict=True)):
         following, flows = plant.step(
             states[-1], Command(on, power), float(demand[k]), float(cycle.step_speed_mps[k])
@@ -146,7 +146,7 @@ def test_lossless_battery_has_a_closed_form() -> None:
     )
     cycle = steady(20.0, 40)
     solution = solve_dp(cycle, vehicle, COARSE)
-    power_w = demand_w(cycle, vehicle.chassis)[0] + vehicle.battery.aux_power_w
+    power_w = demand_w(cycle, vehicle)[0] + vehicle.battery.aux_power_w
     energy_j = 40 * power_w
     most_w = power_w + vehicle.battery.power_charge_max_w
     line = plant_of(vehicle).line
@@ -164,7 +164,7 @@ def test_exhaustive_search_finds_nothing_better(settings_: dict[str, object]) ->
     vehicle = VEHICLE.with_settings(settings_)
     speed = np.array([12.0, 13.0, 14.5, 15.0, 14.0, 11.0])
     cycle = Cycle.from_samples("burst", np.arange(6), speed)
-    demand = demand_w(cycle, vehicle.chassis)
+    demand = demand_w(cycle, vehicle)
     best = np.inf
     for pattern in product((False, True), repeat=5):
         on = np.flatnonzero(pattern)
@@ -212,7 +212,7 @@ def test_no_rule_beats_it(urban_solution: DpSolution, threshold_w: float, follow
     The base is set so that the trip ends at the SOC it began with.
     """
     cycle = urban()
-    demand = demand_w(cycle, VEHICLE.chassis)
+    demand = demand_w(cycle, VEHICLE)
     on = demand > threshold_w
 
     def drive(base_w: float) -> tuple[float, float]:

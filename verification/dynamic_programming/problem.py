@@ -88,7 +88,7 @@ def build_problem(cycle: Cycle, vehicle: Vehicle) -> Problem:
             f"thermal.t_cl_min_degc .. t_cl_max_degc, {thermal.t_cl_min_degc:g} .. "
             f"{thermal.t_cl_max_degc:g} (given: {trip.t_cl_init_degc:g})"
         )
-    demand = demand_w(cycle, vehicle.chassis)
+    demand = demand_w(cycle, vehicle)
     running, starting, off_allowed = power_limits(vehicle, demand)
     greatest_w = float(max(running.high_w.max(), starting.high_w.max()))
     lhv_j_per_g = engine.lhv_j_per_g

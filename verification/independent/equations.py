@@ -35,13 +35,18 @@ class Equations:
         car, v = self.vehicle.chassis, cycle.speed_mps
         mean = (v[:-1] + v[1:]) / 2.0
         grade = cycle.step_grade
+        below_k = 24.0 - self.vehicle.thermal.t_amb_degc
+        cold = 1.0 + max(car.road_load_share_per_k * below_k, 0.0)
         force = (
-            np.where(mean > 0.0, car.road_load_a_n, 0.0)
-            + mean * (car.road_load_b_n_per_mps + car.road_load_c_n_per_mps2 * mean)
+            np.where(mean > 0.0, car.road_load_a_n, 0.0) * cold
+            + mean * cold * (car.road_load_b_n_per_mps + car.road_load_c_n_per_mps2 * mean)
             + car.mass_kg * car.rotating_mass_factor * (v[1:] - v[:-1])
             + car.mass_kg * GRAVITY_MPS2 * np.sin(np.arctan(grade))
         )
-        factor = np.where(force * mean < 0.0, car.eta_regen, 1.0 / car.eta_drive)
+        regen = np.full(len(mean), car.eta_regen)
+        if car.regen_full_mps > 0.0:
+            regen *= np.interp(mean, [car.regen_from_mps, car.regen_full_mps], [0.0, 1.0])
+        factor = np.where(force * mean < 0.0, regen, 1.0 / car.eta_drive)
         return np.asarray(force * mean * factor)
 
     def net_w(self, cycle: Cycle) -> Floats:

@@ -87,13 +87,15 @@ class Study:
     def above_optimum_g(self, cycle: str, label: str) -> float:
         """Fuel above dynamic programming with the final SOC at dynamic programming's own price.
 
-        m - lambda (SOC_end - SOC_init) - m_dp, with lambda the costate of the final SOC: the
-        least fuel is convex in the final SOC, so this is a lower bound of the distance from the
-        optimum that ends where the run ended. Fixed efficiencies do not give such a bound.
+        m - lambda (SOC_end - SOC_dp) - m_dp, with lambda the price of SOC: the least fuel is
+        convex in the final SOC, so this is a lower bound of the distance from the optimum that
+        ends where the run ended. Fixed efficiencies do not give such a bound. The price is that
+        of departure: it hardly changes on the way, and near arrival, where dynamic programming
+        has few choices left, the one found there is off by up to a few percent.
         """
         run, best = self.runs[cycle, label], self.optima[cycle]
         surplus = float(run.trajectory.soc[-1]) - float(best.soc[-1])
-        return run.fuel_g - float(best.soc_costate_g[-1]) * surplus - best.fuel_total_g
+        return run.fuel_g - float(best.soc_costate_g[0]) * surplus - best.fuel_total_g
 
 
 def job_count(extent: Extent) -> int:
