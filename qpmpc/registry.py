@@ -258,13 +258,16 @@ def reads(controller: str, key: str) -> bool:
 def without_effect(settings: Mapping[str, object], controllers: Sequence[ControllerLike]) -> str:
     """Say which settings of shipped controllers reach none of those that will run.
 
-    Controllers of somebody else's may read any of them.
+    Or are of none beside the others: those of demand classes, where there is one. Controllers of
+    somebody else's may read any of them.
     """
     if not all(isinstance(what, str) and what in _READS for what in controllers):
         return ""
     names = [what for what in controllers if isinstance(what, str)]
-    idle = sorted(key for key in settings if not any(reads(name, key) for name in names))
-    return f"no effect on {', '.join(names)}: {', '.join(idle)}" if idle else ""
+    idle = {key for key in settings if not any(reads(name, key) for name in names)}
+    of_controllers = {key: value for key, value in settings.items() if not is_of_vehicle(key)}
+    idle |= ControllerSettings().with_settings(of_controllers).idle() & settings.keys()
+    return f"no effect on {', '.join(names)}: {', '.join(sorted(idle))}" if idle else ""
 
 
 # Settings that shipped controllers read, by the beginning of their names, and whether they read

@@ -25,6 +25,7 @@ from qpmpc.registry import (
     controller_names,
     make_controller,
     split_settings,
+    without_effect,
 )
 from qpmpc.simulation import simulate
 from qpmpc.trip import Trip
@@ -239,6 +240,26 @@ def test_one_comparison_has_one_vehicle(trip):
     cars = [Trip("nycc", "prius-nimh"), Trip("udds", "prius-liion")]
     with pytest.raises(InputError, match=r"not several \(prius-nimh, prius-liion\)"):
         compare(cars, ["rule-based"])
+
+
+@pytest.mark.parametrize(
+    ("settings", "idle"),
+    [
+        (
+            {"mh_qp.horizon.classes": 1, "mh_qp.horizon.swing_share": 0.5},
+            "mh_qp.horizon.swing_share",
+        ),
+        ({"mh_qp.horizon.block_s": 60}, "mh_qp.horizon.block_s"),
+        (
+            {"mh_qp.horizon.blocks": 0, "mh_qp.horizon.block_s": 0, "mh_qp.horizon.classes": 1},
+            "mh_qp.horizon.classes",
+        ),
+        ({"mh_qp.solver": "piqp", "mh_qp.admm.iterations": 20}, "mh_qp.admm.iterations"),
+        ({"mh_qp.horizon.blocks": 0, "mh_qp.horizon.block_s": 60}, ""),
+    ],
+)
+def test_settings_without_effect_beside_others_are_named(settings, idle):
+    assert without_effect(settings, ["mh-qp"]) == (f"no effect on mh-qp: {idle}" if idle else "")
 
 
 def test_settings_without_effect_are_said(trip, caplog):

@@ -197,6 +197,16 @@ class ControllerSettings(BaseModel):
         """Return the names of the sections of shipped controllers."""
         return tuple(name for name in cls.model_fields if name != "others")
 
+    def idle(self) -> set[str]:
+        """Return dotted names of settings that have no effect beside the others."""
+        found = set()
+        for section in ("mh_qp", "mh_qp_paper"):
+            values: MhQpSettings = getattr(self, section)
+            found |= {f"{section}.horizon.{name}" for name in values.horizon.idle()}
+            if values.solver not in (None, "osqp"):
+                found |= {f"{section}.admm.{name}" for name in AdmmSettings.model_fields}
+        return found
+
     def of(self, section: str, default: Model) -> Model:
         """Return the settings of a section that another package owns.
 

@@ -44,6 +44,16 @@ class HorizonSettings(BaseModel):
             raise ValueError("class_braking_w must not be above class_hard_w")
         return self
 
+    def idle(self) -> set[str]:
+        """Return the names of settings that have no effect beside the others."""
+        found = {"block_s"} if self.blocks else set()
+        has_blocks = self.blocks or self.block_s
+        if not has_blocks:
+            found.add("classes")
+        if not has_blocks or self.classes == 1:
+            found |= {"class_hard_w", "class_braking_w", "swing_share", "rise_share"}
+        return found
+
     def block_length_s(self, trip_steps: int) -> int:
         """Length of a block for a trip of that many 1 s steps, 0 if there are none."""
         return -(-trip_steps // self.blocks) if self.blocks else self.block_s
