@@ -12,6 +12,9 @@ from qpmpc.qp.structure import QpStructure
 Floats = NDArray[np.float64]
 
 SAME = 1e-9  # distance of two rows of unit norm that are one and the same
+# Rows of hundreds of entries are searched for by a few sums of them: unequal rows share all of
+# these by chance only, which would show as a difference, never hide one.
+SUMS, SEED = 6, 1
 
 
 @dataclass(frozen=True)
@@ -111,7 +114,7 @@ def _unmatched(one: Floats, other: Floats) -> float:
     (one, times), (other, other_times) = _distinct(one), _distinct(other)
     if len(one) != len(other):
         return float("inf")
-    _, partner = KDTree(other).query(one)
+    _, partner = KDTree(_sums(other)).query(_sums(one))
     if len(np.unique(partner)) != len(one) or np.any(times != other_times[partner]):
         return float("inf")
     return float(np.abs(one - other[partner]).max())
@@ -120,9 +123,15 @@ def _unmatched(one: Floats, other: Floats) -> float:
 def _distinct(rows: Floats) -> tuple[Floats, NDArray[np.intp]]:
     """Rows that differ, and how often each occurs: a stage may have the same row twice."""
     times, first = np.ones(len(rows), dtype=np.intp), np.arange(len(rows))
-    for i, j in sorted(KDTree(rows).query_pairs(SAME)):
-        if first[j] == j:
+    for i, j in sorted(KDTree(_sums(rows)).query_pairs(SAME)):
+        if first[j] == j and np.linalg.norm(rows[i] - rows[j]) <= SAME:
             first[j] = first[i]
             times[first[i]] += 1
     kept = first == np.arange(len(rows))
     return rows[kept], times[kept]
+
+
+def _sums(rows: Floats) -> Floats:
+    """Coordinates of the rows along random unit directions at right angles: never further apart."""
+    directions = np.random.default_rng(SEED).standard_normal((rows.shape[1], SUMS))
+    return np.asarray(rows @ np.linalg.qr(directions)[0])
