@@ -15,11 +15,15 @@ Floats = NDArray[np.float64]
 ITERATION_LIMIT = 300
 # measured on recorded steps: larger ones cost iterations, smaller ones gain none
 WARM_BARRIER, WARM_PUSH = 1e-7, 1e-6
+# CasADi's options for derivatives made elsewhere, and its names of them
+_DERIVATIVES = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g", "hess_lag": "nlp_hess_l"}
 DEPARTURE_SIGMA, DEPARTURE_POWER_W = 0.3, 12e3
 
 _COMMON = {
     "expand": True,
     "print_time": False,
+    "calc_lam_p": False,  # sensitivities to the parameters, and the gradient for them alone
+    "no_nlp_grad": True,
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
     "ipopt.max_iter": ITERATION_LIMIT,
@@ -99,7 +103,9 @@ class NlpSolver:
         self.problem = problem
         ca = casadi()
         self._cold: Any = ca.nlpsol("cold", "ipopt", problem.program, _COMMON)
-        self._warm: Any = ca.nlpsol("warm", "ipopt", problem.program, _COMMON | _WARM)
+        # making the derivatives takes as long as a hundred iterations: both have the same
+        made = {option: self._cold.get_function(name) for option, name in _DERIVATIVES.items()}
+        self._warm: Any = ca.nlpsol("warm", "ipopt", problem.program, _COMMON | _WARM | made)
 
     def solve(
         self,
