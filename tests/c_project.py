@@ -52,18 +52,20 @@ def sources(folder: Path) -> list[str]:
 def build(folder: Path, compiler: str, flags: str, program: str, *own: str) -> None:
     """Compile a program from its own files, the controller and OSQP, if it is the solver.
 
-    `own` may begin with more flags. OSQP divides by a residual of zero, for a figure that it only
+    `own` may begin with more flags. The objects of controller and OSQP are kept for the next
+    program with the same flags. OSQP divides by a residual of zero, for a figure that it only
     reports.
     """
     osqp = sorted(str(p.relative_to(folder)) for p in folder.glob("osqp/**/*.c"))
     kind = abs(hash((compiler, flags)))
-    objects = {name: f"{Path(name).stem}-{kind}.o" for name in osqp}
+    objects = {name: f"{Path(name).stem}-{kind}.o" for name in (*sources(folder), *osqp)}
     for name, made in objects.items():
         if not (folder / made).exists():
-            also = ["-w", "-fno-sanitize=float-divide-by-zero", "-c", "-o", made, name]
+            theirs = ["-w", "-fno-sanitize=float-divide-by-zero"] if name in osqp else []
+            also = [*theirs, "-c", "-o", made, name]
             built = run(folder, compiler, *flags.split(), *OUTSIDE, *also)
             assert built.returncode == 0, built.stderr
-    files = [*own, *sources(folder), *objects.values(), "-lm"]
+    files = [*own, *objects.values(), "-lm"]
     built = run(folder, compiler, *flags.split(), *OUTSIDE, "-o", program, *files)
     if built.returncode and "clang_rt" in built.stderr:
         pytest.skip("not installed: clang's run-time library (libclang-rt-dev)")
