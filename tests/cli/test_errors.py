@@ -160,20 +160,36 @@ def test_interrupt(cli, trip, monkeypatch):
     assert done.err == "qpmpc: interrupted\n"
 
 
+# The signal comes a moment after the drive has begun, however long loading takes.
+INTERRUPTED = """
+import os, signal, sys, threading, time
+# some packages swallow it while they load
+import qpmpc.codegen.implementation, qpmpc.simulation
+from qpmpc.cli import main
+
+def drives(thread):
+    frame = sys._current_frames()[thread.ident]
+    while frame is not None and not frame.f_code.co_filename.endswith("closed_loop.py"):
+        frame = frame.f_back
+    return frame is not None
+
+def interrupt():
+    while not drives(threading.main_thread()):
+        time.sleep(0.02)
+    time.sleep(1.0)
+    os.kill(os.getpid(), signal.SIGINT)
+
+threading.Thread(target=interrupt, daemon=True).start()
+main(["simulate", "wltc-3b", "--set", "mh_qp.admm.iterations=5000", *sys.argv[1:]])
+"""
+
+
 @pytest.mark.parametrize("implementation", ["python", "c"])
 def test_interrupt_reaches_a_run_that_spends_its_time_in_the_solver(tmp_path, implementation):
     """OSQP catches the signal itself and would swallow it."""
-    script = (
-        "import os, signal, threading\n"
-        # some packages swallow it while they load
-        "import qpmpc.codegen.implementation, qpmpc.simulation\n"
-        "from qpmpc.cli import main\n"
-        "threading.Timer(5.0, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
-        "main(['simulate', 'wltc-3b', '--set', 'mh_qp.admm.iterations=5000',"
-        f" '--set', 'mh_qp.implementation={implementation}'])\n"
-    )
+    chosen = ["--set", f"mh_qp.implementation={implementation}"]
     done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path
+        [sys.executable, "-c", INTERRUPTED, *chosen], capture_output=True, text=True, cwd=tmp_path
     )
     assert done.returncode == 130
     assert done.stderr.removeprefix("Solver interrupted\n") == "qpmpc: interrupted\n"  # OSQP's
