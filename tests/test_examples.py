@@ -12,15 +12,21 @@ FOLDER = Path(__file__).parents[1] / "examples"
 SCRIPTS = sorted(file.name for file in FOLDER.glob("*.py"))
 
 
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Folder of one cache for all of them, as on a user's machine: most have the same C library."""
+    return str(tmp_path_factory.mktemp("cache"))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SCRIPTS)
-def test_example(name: str, tmp_path: Path) -> None:
+def test_example(name: str, tmp_path: Path, cache: str) -> None:
     if name == "embedded.py" and not all(map(shutil.which, ("make", "cc"))):
         pytest.skip("not installed: make, cc")
     done = subprocess.run(
         [sys.executable, "-W", "error", FOLDER / name],
         cwd=tmp_path,
-        env={**os.environ, "QPMPC_CACHE_DIR": str(tmp_path / "cache")},
+        env={**os.environ, "QPMPC_CACHE_DIR": cache},
         capture_output=True,
         text=True,
         check=False,
