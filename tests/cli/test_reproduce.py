@@ -1,8 +1,12 @@
 """``qpmpc reproduce``: refused before any time is spent, and one quick run of all of it."""
 
 import json
+from dataclasses import replace
 
 import pytest
+
+from qpmpc.cycles import Cycle
+from qpmpc.verification.reproduction import Extent
 
 
 @pytest.mark.parametrize(
@@ -40,6 +44,13 @@ def test_without_the_plot_extra_it_says_what_to_install(cli, tmp_path):
 
 @pytest.mark.slow
 def test_the_other_car_on_a_mild_day(cli, tmp_path, monkeypatch, strict_json):
+    """The first minute is enough for the way in and out; `verification` has the quick run."""
+    quick = Extent.quick()
+    minutes = tuple(
+        Cycle(cycle.name, cycle.time_s[:61], cycle.speed_mps[:61], cycle.grade[:61])
+        for cycle in quick.cycles
+    )
+    monkeypatch.setattr(Extent, "quick", lambda: replace(quick, cycles=minutes))
     monkeypatch.setenv("QPMPC_CACHE_DIR", str(tmp_path / "cache"))
     out, data = tmp_path / "out", tmp_path / "data.json"
     done = cli(
