@@ -1,6 +1,7 @@
 """Four renderings of the QP are one, and every way of telling them apart works."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,12 @@ def made(
     departure = next(recorded_cases(trip, settings, every=250))
     stages = renderings.preview.count
     return renderings, [departure, *random_cases(trip, stages, 2, 7)]
+
+
+@cache
+def usual() -> tuple[Renderings, list[QpCase]]:
+    """Those of the default settings, made once: every use updates all that it reads."""
+    return made()
 
 
 def assert_equal(renderings: Renderings, case: QpCase) -> None:
@@ -147,7 +154,7 @@ def test_without_a_compiler_the_others_are_compared(monkeypatch) -> None:
 
 
 def test_twin_is_compiled_once_and_updated() -> None:
-    renderings, cases = made()
+    renderings, cases = usual()
     twin = renderings.twin
     assert twin.problem.is_dpp()
     values = []
@@ -164,7 +171,7 @@ def test_twin_is_compiled_once_and_updated() -> None:
 
 
 def test_twin_plans_as_the_product_does_without_regularisation() -> None:
-    renderings, cases = made()
+    renderings, cases = usual()
     inputs = renderings.inputs(cases[0])
     renderings.twin.update(*inputs)
     x = renderings.twin.solve()
@@ -178,7 +185,7 @@ def test_twin_plans_as_the_product_does_without_regularisation() -> None:
 
 
 def test_twin_says_when_there_is_no_optimum() -> None:
-    renderings, cases = made()
+    renderings, cases = usual()
     inputs = renderings.inputs(cases[0])
     twin = renderings.twin
     twin.update(*inputs)
@@ -197,7 +204,7 @@ def changed(matrices: Matrices, part: str, entry: tuple[int, ...], factor: float
 
 
 def test_difference_sees_any_entry_but_not_order_sign_or_scale() -> None:
-    renderings, cases = made()
+    renderings, cases = usual()
     case = cases[2]
     data = renderings.qp.update(*renderings.inputs(case))
     column = data.scaling.column
