@@ -159,3 +159,15 @@ def test_the_costate_at_departure_is_the_price_of_the_final_soc(short):
         for soc_end in (0.58, 0.62)
     )
     assert float(best.soc_costate_g[0]) == pytest.approx((more - less) / 0.04, rel=0.02)
+
+
+def test_charge_that_the_trip_does_not_need_makes_it_no_dearer():
+    """A plug-in that departs full burns for heat alone, as one that departs at 0.35.
+
+    Its iterations once ended long before the price of charge was down to nothing: 29 g, not 22.
+    """
+    fuel = [
+        simulate(Trip("nycc", car("prius-prime", trip__soc_init=soc)), "mh-qp").fuel_g
+        for soc in (0.35, 0.9)
+    ]
+    assert fuel[1] < 1.02 * fuel[0]

@@ -134,7 +134,7 @@ def qp_parameters(
         "t_max_degc": thermal.t_cl_max_degc - T_CL_MAX_MARGIN_K,
         "slack_g_per_k": settings.slack_g_per_k,
         "regularisation": settings.regularisation,
-        "unit_soc": units.energy_j / model.battery_energy_j,
+        "unit_soc": units.unit_soc(model.battery_energy_j),
         "unit_t_k": units.t_cl_k,
         "unit_power_w": units.power_w,
         "unit_fuel_g_per_s": units.fuel_g_per_s,
