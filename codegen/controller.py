@@ -39,6 +39,7 @@ class InputBuilder:
         into.soc, into.t_cl_degc = seen.soc, seen.t_cl_degc
         into.demand_w, into.speed_mps = seen.demand_w, seen.speed_mps
         into.engine_on, into.second = int(seen.engine_on), seen.step
+        into.fuel_g = seen.fuel_g  # a field of C where it is read
         preview = self.receive(seen.step)
         into.short_count = preview.short_count
         into.short_demand_w[:] = preview.short_demand_w.tolist()
@@ -93,6 +94,8 @@ class GeneratedController(Controller):
         blocks = self.of_qp.horizon.block_count(trip.forecast.steps)
         rules, section = self.settings.rule_based, name.replace("-", "_")
         values = values_of(trip.vehicle, self.of_qp, rules, blocks, section)
+        self.reads_fuel = self.of_qp.learning
+        self._model = PwaModel.of(trip.vehicle, self.of_qp.pwa, self.of_qp.learning)
         self.library = self._normal = build_host_library(values, precision)
         self.remarks += filter(None, [self.library.remark])
         self.fill_s = self.call_s = 0.0
@@ -113,7 +116,7 @@ class GeneratedController(Controller):
                 pass
             if left == 0:
                 layout, stages = self.of_qp.horizon, self._preview.at(self.trip.start.step)
-                model, x = PwaModel.of(self.trip.vehicle, self.of_qp.pwa), self.plan()[0]
+                model, x = self._model, self.plan()[0]
                 self.expects = expectation(self.trip, layout, model, stages, x)
 
     def step(self, seen: Observation) -> Decision:

@@ -201,7 +201,9 @@ class Target:
     def __init__(self, elf: Path, values: Values, precision: Precision, folder: Path) -> None:
         require_tools()
         sizes = values.sizes
-        self.input_type, output = structures(precision, sizes.short_stages, sizes.long_stages)
+        self.input_type, output = structures(
+            precision, sizes.short_stages, sizes.long_stages, values.learning
+        )
 
         class _Answer(ctypes.Structure):
             _fields_ = [

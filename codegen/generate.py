@@ -98,7 +98,10 @@ def project_files(
     one_of(precision, PRECISIONS, "precision")
     one_of(algorithm, ALGORITHMS, "algorithm")
     checked_prefix(prefix)
-    files = _texts("runtime") | rows_files(values.table, tuple(values.scalars), algorithm)
+    learning = values.learning
+    files = _texts("runtime") | rows_files(values.table, tuple(values.scalars), algorithm, learning)
+    if not learning:
+        del files["mpc_learned.c"]
     of_osqp: dict[str, str] = {}
     if algorithm == "osqp":
         del files["mpc_admm.c"], files["mpc_admm.h"]

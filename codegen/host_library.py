@@ -53,7 +53,7 @@ _WITHOUT_OBJECTS: set[str] = set()  # compilers that could not make or link one
 
 
 @cache
-def structures(precision: Precision, short: int, long: int) -> tuple[Any, Any]:
+def structures(precision: Precision, short: int, long: int, learning: bool) -> tuple[Any, Any]:
     """Return the ctypes twins of `mpc_in` and `mpc_out`."""
     real = ctypes.c_float if precision == "f32" else ctypes.c_double
 
@@ -75,6 +75,7 @@ def structures(precision: Precision, short: int, long: int) -> tuple[Any, Any]:
             ("short_count", ctypes.c_int32),
             ("second", ctypes.c_int32),
             ("engine_on", ctypes.c_int32),
+            *([("fuel_g", real)] if learning else []),
         ]
 
     class MpcOut(ctypes.Structure):
@@ -146,7 +147,7 @@ class HostLibrary:
         self.values, self.precision, self.remark = values, precision, remark
         self.real = ctypes.c_float if precision == "f32" else ctypes.c_double
         self.input_type, self.output_type = structures(
-            precision, sizes.short_stages, sizes.long_stages
+            precision, sizes.short_stages, sizes.long_stages, values.learning
         )
         try:
             self.functions = loaded(file)

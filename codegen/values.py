@@ -13,7 +13,9 @@ from qpmpc.controllers.rule_based import last_rung
 from qpmpc.controllers.settings import MhQpSettings, RuleBasedSettings
 from qpmpc.errors import InputError
 from qpmpc.preview import checked, swing
+from qpmpc.pwa import learned_fuel
 from qpmpc.pwa.model import PwaModel
+from qpmpc.pwa.model import learned_fuel as learner_of
 from qpmpc.qp import coolant_floor, linearisation, polish, rows, stage_qp
 from qpmpc.qp.quantities import pieces_of
 from qpmpc.qp.rows import Rows, Table, table_of
@@ -43,6 +45,7 @@ CONSTANTS: dict[str, dict[str, float]] = {
         (swing, "NO_LIMIT_J LEAST_KEPT_J"),
         (stage_qp, "LEAST_COST"),
         (polish, "LEAST_RATIO"),
+        (learned_fuel, "KEPT PRIOR_S LEVEL_MOST TILT_MOST RATIO_LEAST RATIO_MOST SUM_MOST"),
         (coolant_floor, "USABLE"),
         (rows, "SHORTEST_SCALE_S SIGMA_FORCED COOL_SHARE MOOT_G_PER_S"),
         (base, "LARGEST_PLAUSIBLE"),
@@ -96,6 +99,7 @@ class Values:
     departure_linearisations, plan_valid_steps, warm_up_steps : as in the Python controller
     duration_exponent : of the column scaling
     block_s : length of a block; 0 if the trip's length sets it
+    learning : whether the fuel map is learned
     """
 
     vehicle: str
@@ -108,6 +112,7 @@ class Values:
     duration_exponent: float
     counts: dict[str, int]
     block_s: int
+    learning: bool
     departure_linearisations: int = DEPARTURE_LINEARISATIONS
     plan_valid_steps: int = PLAN_VALID_STEPS
     warm_up_steps: int = WARM_UP_STEPS
@@ -147,7 +152,7 @@ def values_of(
         that the solver would treat it as an equality, or a setting is one of Python's solvers.
     """
     _refuse_unknown(settings, section)
-    model = PwaModel.of(vehicle, settings.pwa)
+    model = PwaModel.of(vehicle, settings.pwa, settings.learning)
     line, maps = optimal_line(vehicle.engine), BatteryMaps(vehicle.battery)
     blocks = settings.horizon.blocks if blocks is None else blocks
     if blocks < 1:
@@ -182,6 +187,11 @@ def values_of(
         "resistance_discharge_ohm": _array(vehicle.battery.resistance_discharge_ohm),
         "fuel_g_per_s": line.fuel_g_per_s,
     }
+    if settings.learning:
+        learner = learner_of(vehicle, settings.pwa)
+        scalars["learned_most_g"] = learner.most_g
+        arrays["learned_power_w"] = learner.power_w
+        arrays["learned_map_g_per_s"] = learner.map_g_per_s
     return Values(
         vehicle=vehicle.name,
         table=table_of(vehicle.engine),
@@ -207,6 +217,7 @@ def values_of(
             "rule_min_on_s": max(rules.min_on_s, vehicle.engine.min_on_s),
         },
         block_s=fixed_block_s(settings.horizon),
+        learning=settings.learning,
     )
 
 

@@ -178,7 +178,7 @@ def _made(
     what: ControllerLike, trip: Trip, settings: ControllerSettings, car: ForeignCar | None
 ) -> Controller:
     if car is not None and what == car.name:
-        return car.own_control(trip)
+        return car.own_control(trip.as_believed)
     return make_controller(what, trip, settings)
 
 

@@ -17,6 +17,7 @@ from qpmpc.names import Names, Shipped, unknown
 from qpmpc.problems import shown_value
 from qpmpc.solvers.names import SOLVERS
 from qpmpc.trip import Trip
+from qpmpc.vehicle.belief import is_of_model
 from qpmpc.vehicle.names import VEHICLES
 from qpmpc.vehicle.parameters import Vehicle
 
@@ -150,7 +151,7 @@ def make_controller(
             f"controller {what!r} leads to one with the name {made.name!r}: the two must be equal"
         )
     if isinstance(made, Planner):
-        made = RecedingHorizon(trip, made, None if made is what else settings)
+        made = RecedingHorizon(trip.as_believed, made, None if made is what else settings)
     made.check_ready(trip)
     return made
 
@@ -168,7 +169,7 @@ def _called(
         raise InputError(
             f"controller {name!r} must be made of a trip and settings: {error}"
         ) from error
-    return maker(trip, settings)
+    return maker(trip if getattr(maker, "knows_plant", False) else trip.as_believed, settings)
 
 
 def _table_of(name: str) -> Names:
@@ -186,7 +187,10 @@ def _table_of(name: str) -> Names:
 def split_settings(
     settings: Mapping[str, object], controllers: Sequence[ControllerLike] = ()
 ) -> tuple[dict[str, object], ControllerSettings]:
-    """Split dotted settings into those of the vehicle and those of the controllers.
+    """Split dotted settings into those of the trip and those of the controllers.
+
+    Those of the trip are its vehicle's and those of the controllers' model of it, for
+    `Trip.with_settings`.
 
     Parameters
     ----------
@@ -198,7 +202,7 @@ def split_settings(
     InputError
         If the first part of a name is neither, or a controller's setting is not allowed.
     """
-    of_vehicle = {key: value for key, value in settings.items() if is_of_vehicle(key)}
+    of_vehicle = {key: value for key, value in settings.items() if _is_of_trip(key)}
     of_controllers = {key: value for key, value in settings.items() if key not in of_vehicle}
     chosen = ControllerSettings().with_settings(of_controllers)
     check_sections(chosen, controllers)
@@ -208,6 +212,10 @@ def split_settings(
 def is_of_vehicle(key: str) -> bool:
     """Whether a dotted setting is one of the vehicle."""
     return key.partition(".")[0] in Vehicle.model_fields and "." in key
+
+
+def _is_of_trip(key: str) -> bool:
+    return is_of_vehicle(key) or is_of_model(key)
 
 
 def check_sections(
@@ -230,7 +238,7 @@ def check_sections(
         else:
             added = [_section(name) for name in (*CONTROLLERS.added, *PLANNERS.added)]
             known = sorted(
-                {*ControllerSettings.sections(), "dp", *own, *added, *Vehicle.model_fields}
+                {*ControllerSettings.sections(), "dp", "model", *own, *added, *Vehicle.model_fields}
                 - _SCALARS
             )
             key = ".".join([section, *list(values)[:1]])
@@ -250,6 +258,8 @@ def reads(controller: str, key: str) -> bool:
 
     Controllers of somebody else's may read any of them.
     """
+    if is_of_model(key):
+        return controller not in ("dp", "fastsim")  # the plant is known to one, the other's own
     if controller not in _READS or key.partition(".")[0] in Vehicle.model_fields:
         return True
     return any(key == part or key.startswith(f"{part}.") for part in _READS[controller])
@@ -265,7 +275,7 @@ def without_effect(settings: Mapping[str, object], controllers: Sequence[Control
         return ""
     names = [what for what in controllers if isinstance(what, str)]
     idle = {key for key in settings if not any(reads(name, key) for name in names)}
-    of_controllers = {key: value for key, value in settings.items() if not is_of_vehicle(key)}
+    of_controllers = {key: value for key, value in settings.items() if not _is_of_trip(key)}
     idle |= ControllerSettings().with_settings(of_controllers).idle() & settings.keys()
     return f"no effect on {', '.join(names)}: {', '.join(sorted(idle))}" if idle else ""
 

@@ -127,7 +127,7 @@ def prepared(
             "make it, and its trip, with them"
         )
     if of_vehicle:
-        trip = trip.with_vehicle(trip.vehicle.with_settings(of_vehicle))
+        trip = trip.with_settings(of_vehicle)
     return trip, chosen
 
 

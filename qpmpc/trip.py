@@ -1,7 +1,8 @@
 """One trip: a cycle, the vehicle that drives it, and its forecast."""
 
 import os
-from math import inf
+from collections.abc import Mapping
+from math import inf, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -14,13 +15,14 @@ from qpmpc.preview.forecast import Trace
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.preview.stages import StageBuilder
 from qpmpc.vehicle import DEFAULT_VEHICLE, Plant, PlantState, Vehicle, load_vehicle
+from qpmpc.vehicle.belief import differences, with_settings
 from qpmpc.vehicle.plant import LONG_AGO_S
 
 
 class Observation(NamedTuple):
     """Measurements at the start of a step; demand and speed are those of the coming second.
 
-    The last two are not measured: a controller counts for itself (`InputMonitor`).
+    The last two but one are not measured: a controller counts for itself (`InputMonitor`).
 
     Attributes
     ----------
@@ -32,6 +34,7 @@ class Observation(NamedTuple):
     speed_mps : mean speed
     engine_for_s : seconds since the engine was started or stopped, as far as known
     p_eng_before_w : its power in the last step while on; infinite if not known
+    fuel_g : injected in the last step; nan if it is not measured
     """
 
     step: int
@@ -42,6 +45,7 @@ class Observation(NamedTuple):
     speed_mps: float
     engine_for_s: int = LONG_AGO_S
     p_eng_before_w: float = inf
+    fuel_g: float = nan
 
 
 class Trip:
@@ -53,6 +57,8 @@ class Trip:
     vehicle : a name or TOML file as `load_vehicle` takes it, or a vehicle
     forecast : demand and speed for the long horizon, or a cycle from which they are computed; the
         truth if None. Its length may differ from the trip's.
+    model : the vehicle that controllers believe to drive; the truth if None. A controller that you
+        make yourself for such a trip is made of its `as_believed`
 
     Attributes
     ----------
@@ -72,10 +78,12 @@ class Trip:
         cycle: str | os.PathLike[str] | Cycle,
         vehicle: str | os.PathLike[str] | Vehicle = DEFAULT_VEHICLE,
         forecast: Trace | Cycle | None = None,
+        model: Vehicle | None = None,
     ) -> None:
         self.cycle = cycle if isinstance(cycle, Cycle) else load_cycle(cycle)
         self.vehicle = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle)
         self.plant = Plant(self.vehicle)
+        self.model = None if model == self.vehicle else model
         self.truth = Trace.of(self.cycle, self.vehicle)
         if not isinstance(forecast, Trace | Cycle | None):
             raise InputError(
@@ -108,13 +116,18 @@ class Trip:
             state.engine_on,
             self._demand_w[step],
             self._speed_mps[step],
+            fuel_g=state.fuel_g,
         )
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """What a user should know of the cycle and of its forecast, one line each."""
+        of_model = ""
+        if self.model is not None:
+            different = "; ".join(differences(self.vehicle, self.model))
+            of_model = f"the model that all controllers but dp have is wrong: {different}"
         of_forecast = place.remark(self.truth, self.forecast)
-        return (*self.cycle.remarks, of_forecast) if of_forecast else tuple(self.cycle.remarks)
+        return (*self.cycle.remarks, *filter(None, (of_forecast, of_model)))
 
     @property
     def start(self) -> Observation:
@@ -128,18 +141,46 @@ class Trip:
 
     def with_forecast(self, forecast: Trace | Cycle | None) -> "Trip":
         """Return the same trip with another forecast; the truth if None."""
-        return Trip(self.cycle, self.vehicle, forecast)
+        return Trip(self.cycle, self.vehicle, forecast, self.model)
 
     def with_vehicle(self, vehicle: Vehicle) -> "Trip":
-        """Return the same trip by another vehicle, with the same forecast.
+        """Return the same trip by another vehicle, with the same forecast and model.
 
         The demand of a forecast given as a cycle is computed anew; one given as a trace stays.
         """
-        return Trip(self.cycle, vehicle, self._given)
+        return Trip(self.cycle, vehicle, self._given, self.model)
+
+    @property
+    def as_believed(self) -> "Trip":
+        """The trip as controllers know it: driven by the model."""
+        return self if self.model is None else Trip(self.cycle, self.model, self._given)
+
+    @property
+    def believed(self) -> Vehicle:
+        """The vehicle that controllers believe to drive."""
+        return self.vehicle if self.model is None else self.model
+
+    def with_settings(self, settings: Mapping[str, object]) -> "Trip":
+        """Return the same trip with dotted settings of its vehicle and of the model of it.
+
+        Those of the vehicle apply to a model of its own too; ``model.NAME`` is a factor of `Belief`
+        on the vehicle.
+
+        Raises
+        ------
+        InputError
+            If a key does not exist or a value is not allowed.
+        """
+        vehicle, model = with_settings(self.vehicle, self.model, settings)
+        return Trip(self.cycle, vehicle, self._given, model)
 
     def same_as(self, other: "Trip") -> bool:
-        """Whether cycle, vehicle and forecast are equal number by number."""
-        return self is other or (self.same_road_as(other) and _equal(self.forecast, other.forecast))
+        """Whether cycle, vehicle, model and forecast are equal number by number."""
+        return self is other or (
+            self.same_road_as(other)
+            and self.model == other.model
+            and _equal(self.forecast, other.forecast)
+        )
 
     def same_road_as(self, other: "Trip") -> bool:
         """Whether cycle and vehicle are equal number by number, whatever is forecast."""

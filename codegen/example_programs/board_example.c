@@ -122,6 +122,9 @@ static void read_sensors(int32_t step)
     in.demand_w = demand_w[step];
     in.speed_mps = speed_mps[step];
     in.engine_on = out.engine_on;
+#if MPC_LEARNING
+    in.fuel_g = (mpc_real)0.0; /* no such sensor here: nothing is learned */
+#endif
 }
 
 /* YOURS: out.engine_on and out.p_eng_w to the engine's controller. */

@@ -92,6 +92,9 @@ static void measure(int32_t step, int32_t engine_on, mpc_in *in)
     in->t_cl_degc = t_cl_degc[step];
     in->demand_w = demand_w[step];
     in->speed_mps = speed_mps[step];
+#if MPC_LEARNING
+    in->fuel_g = (mpc_real)0.0; /* no such sensor here: nothing is learned */
+#endif
 }
 
 static void drive(int32_t steps)

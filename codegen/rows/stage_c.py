@@ -7,11 +7,14 @@ from qpmpc.codegen.rows.c_text import Writer, wrapped
 from qpmpc.qp import rows
 from qpmpc.qp.coolant import radiator_w_per_k, thermostat_step
 from qpmpc.qp.expressions import is_number, names_in, parsed, targets_of
-from qpmpc.qp.quantities import ABOUT, FLOOR, INPUTS, ORIGIN, STAGE
+from qpmpc.qp.quantities import ABOUT, FLOOR, INPUTS, LEARNED, ORIGIN, STAGE
 from qpmpc.qp.rows import VARIABLES, Entry, Row, Table, Var
 from qpmpc.vehicle import heat
 
 PIECES = ("fuel_slope", "fuel_intercept", "battery_slope", "battery_intercept")
+LEARNED_PLACES = dict(
+    zip(LEARNED, ("slope[i]", "intercept[i]", "idle_g_per_s", "chord_g_per_j"), strict=True)
+)
 FORMULAS: tuple[Callable[..., Any], ...] = (  # Python functions translated into C
     *heat.FUNCTIONS,
     radiator_w_per_k,
@@ -171,10 +174,12 @@ def _running() -> list[str]:
     ]
 
 
-def values_h(table: Table, scalars: Iterable[str]) -> str:
+def values_h(table: Table, scalars: Iterable[str], learning: bool) -> str:
     """Return `mpc_rows_values.h`: entries, bounds, scaling and cost of a stage."""
     names = {name: f"mpc_par.{name}" for name in scalars}
     names |= {name: f"mpc_par.{name}[i]" for name in PIECES}
+    if learning:
+        names |= {name: f"state->learned.{place}" for name, place in LEARNED_PLACES.items()}
     names |= {name: f"road->{name}" for name in INPUTS}
     names |= {name: f"state->{name}" for name in (*ORIGIN, FLOOR[1])}
     names |= {name: name for name, value in vars(rows).items() if isinstance(value, float)}

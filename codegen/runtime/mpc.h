@@ -55,6 +55,9 @@ typedef struct {
     int32_t short_count; /* seconds of the short preview before arrival, 1..MPC_SHORT */
     int32_t second;      /* clock: seconds since departure */
     int32_t engine_on;   /* measured: 1 if the engine ran in the last second, else 0 */
+#if MPC_LEARNING
+    mpc_real fuel_g; /* measured: fuel injected in the last second */
+#endif
 } mpc_in;
 
 /* Rung of the ladder that the command comes from. */

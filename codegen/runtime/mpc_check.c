@@ -8,11 +8,15 @@
  */
 #include "mpc_constants.h"
 #include "mpc_heat.h"
+#include "mpc_learned.h"
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
 #define NO_VALUE REAL(1.0e20)
+#if MPC_LEARNING
+#define NO_FUEL_G REAL(-1.0)
+#endif
 
 static int32_t is_count(int32_t x, int32_t most) { return ((x >= 0) && (x <= most)) ? 1 : 0; }
 
@@ -48,6 +52,10 @@ int32_t mpc_check_state(const mpc_state *state)
     fine &= mpc_check_second(watch->good.demand_w, watch->good.speed_mps);
     fine &= within(watch->good.p_eng_before_w, REAL(0.0), mpc_par.engine_max_w);
     fine &= is_count(watch->good.engine_for_s, LONG_AGO_S);
+#if MPC_LEARNING
+    fine &= within(watch->good.fuel_g, NO_FUEL_G, mpc_par.learned_most_g);
+    fine &= mpc_learned_check(state);
+#endif
     return fine & is_count(watch->good.engine_on, 1);
 }
 
@@ -174,6 +182,14 @@ int32_t mpc_check_measured(mpc_watch *watch, const mpc_in *in, int32_t *elapsed)
         good->engine_on = watch->command_on;
         fine = 0;
     }
+#if MPC_LEARNING
+    if (within(in->fuel_g, REAL(0.0), mpc_par.learned_most_g) != 0) {
+        good->fuel_g = in->fuel_g;
+    } else {
+        good->fuel_g = NO_FUEL_G;
+        fine = 0;
+    }
+#endif
     know_engine(watch, was_on, is_first, passed);
     return flags | ((fine != 0) ? 0 : MPC_BAD_MEASUREMENT);
 }

@@ -27,7 +27,7 @@ void mpc_qp_move_origin(mpc_state *state, mpc_real soc, mpc_real t_cl_degc);
 void mpc_qp_linearise_cold(mpc_state *state);
 void mpc_qp_linearise_about_plan(mpc_state *state);
 void mpc_qp_update(mpc_state *state);
-mpc_real mpc_qp_relaxation_gap(const mpc_stage *stage);
+mpc_real mpc_qp_relaxation_gap(const mpc_state *state);
 
 /* mpc_polish.c: the first second at the plan's prices */
 mpc_real mpc_polish_power_w(const mpc_state *state, mpc_real planned_w);

@@ -5,6 +5,7 @@
  * The same in Python, with the derivation: qpmpc/qp/polish.py.
  */
 #include "mpc_constants.h"
+#include "mpc_learned.h"
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
@@ -29,7 +30,7 @@ mpc_real mpc_polish_power_w(const mpc_state *state, mpc_real planned_w)
     const mpc_real quarter = (mpc_par.plan_voltage_v * mpc_par.plan_voltage_v) / REAL(4.0);
     mpc_real best_w = mpc_par.engine_max_w;
     for (int32_t i = 0; i < MPC_FUEL_PIECES; i++) {
-        const mpc_real priced = ((fuel * mpc_par.fuel_slope[i]) + p_eng) / divisor;
+        const mpc_real priced = ((fuel * FUEL_SLOPE(i)) + p_eng) / divisor;
         const mpc_real ratio = real_max(priced, LEAST_RATIO);
         const mpc_real resistance = (ratio > REAL(1.0)) ? mpc_par.plan_resistance_discharge_ohm
                                                         : mpc_par.plan_resistance_charge_ohm;

@@ -7,6 +7,7 @@
  */
 #include "mpc_battery_side.h"
 #include "mpc_constants.h"
+#include "mpc_learned.h"
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
@@ -150,18 +151,18 @@ void mpc_qp_update(mpc_state *state)
     scale_cost(state);
 }
 
-/* Slack of the relaxed inequalities at a stage, relative:
+/* Slack of the relaxed inequalities at the first stage, relative:
  * (|F - F_pwa| LHV + |G - G_pwa|) / max(|F| LHV + |G|, 1 kW); x in SI units. */
-mpc_real mpc_qp_relaxation_gap(const mpc_stage *stage)
+mpc_real mpc_qp_relaxation_gap(const mpc_state *state)
 {
+    const mpc_stage *const stage = &state->stage[0];
     const mpc_real on = stage->x[MPC_VAR_ON];
     const mpc_real p_eng_w = stage->x[MPC_VAR_P_ENG];
     const mpc_real fuel = stage->x[MPC_VAR_FUEL];
     const mpc_real internal_w = stage->x[MPC_VAR_INTERNAL];
-    mpc_real least_fuel = (mpc_par.fuel_slope[0] * p_eng_w) + (mpc_par.fuel_intercept[0] * on);
+    mpc_real least_fuel = (FUEL_SLOPE(0) * p_eng_w) + (FUEL_INTERCEPT(0) * on);
     for (int32_t i = 1; i < MPC_FUEL_PIECES; i++) {
-        least_fuel = real_max(least_fuel,
-                              (mpc_par.fuel_slope[i] * p_eng_w) + (mpc_par.fuel_intercept[i] * on));
+        least_fuel = real_max(least_fuel, (FUEL_SLOPE(i) * p_eng_w) + (FUEL_INTERCEPT(i) * on));
     }
     const mpc_real bat_w = (on * stage->road.net_w) - p_eng_w;
     mpc_real least_w = (mpc_par.battery_slope[0] * bat_w) + (mpc_par.battery_intercept[0] * on);

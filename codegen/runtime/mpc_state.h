@@ -50,7 +50,26 @@ typedef struct {
     mpc_real p_eng_before_w; /* power in the last second; the greatest while on if not known */
     int32_t engine_on;
     int32_t engine_for_s; /* since it was started or stopped */
+#if MPC_LEARNING
+    mpc_real fuel_g; /* injected in the last second; negative if that is not known */
+#endif
 } mpc_measured;
+
+#if MPC_LEARNING
+/* What is known of the fuel map: sums over past seconds, see mpc_learned.c; and the curve that is
+ * made of them. */
+typedef struct {
+    mpc_real one;
+    mpc_real p;
+    mpc_real pp;
+    mpc_real r;
+    mpc_real rp;
+    mpc_real slope[MPC_FUEL_PIECES];
+    mpc_real intercept[MPC_FUEL_PIECES];
+    mpc_real idle_g_per_s;
+    mpc_real chord_g_per_j;
+} mpc_learned;
+#endif
 
 /* Memory of the checks of measurements. */
 typedef struct {
@@ -98,6 +117,9 @@ typedef struct {
     mpc_watch watch;
     mpc_heard heard;
     mpc_rule_memory rules;
+#if MPC_LEARNING
+    mpc_learned learned;
+#endif
     uint32_t magic_end;
 } mpc_state;
 

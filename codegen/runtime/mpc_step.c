@@ -2,6 +2,7 @@
 #include <stddef.h>
 
 #include "mpc_constants.h"
+#include "mpc_learned.h"
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
@@ -40,6 +41,9 @@ static void prepare(mpc_state *state)
         mpc_qp_move_origin(state, good->soc, good->t_cl_degc);
         mpc_qp_linearise_about_plan(state);
     }
+#if MPC_LEARNING
+    mpc_learned_curve(state);
+#endif
     mpc_floor_find(state, good->soc);
     mpc_qp_update(state);
     mpc_iterate_keep(state);
@@ -210,6 +214,9 @@ int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out)
     out->flags |= mpc_check_measured(watch, in, &elapsed);
     /* the rules are evaluated every second, so that their memory is right if they take over */
     mpc_command command = mpc_rules_decide(&state->rules, &watch->good);
+#if MPC_LEARNING
+    mpc_learned_take(state);
+#endif
     const int32_t passed = (state->is_under_way != 0) ? elapsed : 0;
     move_on(state, passed);
     int32_t is_new = 0;
@@ -223,7 +230,7 @@ int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out)
             is_new = 1;
             keep_plan(state);
             out->on_share = state->stage[0].x[MPC_VAR_ON];
-            out->relaxation_gap = mpc_qp_relaxation_gap(&state->stage[0]);
+            out->relaxation_gap = mpc_qp_relaxation_gap(state);
         }
     }
     if ((state->old_age <= MPC_PLAN_VALID_STEPS) && (state->old_age < MPC_SHORT)) {

@@ -63,10 +63,10 @@ def simulate(
     settings = parse_settings(set_ or [])
     faults = None if inject is None else load_faults(inject)
     of_vehicle, _ = split_settings(settings, [controller])
-    trip = Trip(cycle, load_vehicle(vehicle).with_settings(of_vehicle))
+    trip = Trip(cycle, load_vehicle(vehicle)).with_settings(of_vehicle)
     if forecast is not None:
         model, seed = parse_forecast(forecast)
-        trip = trip.with_forecast(wrong_forecast(trip.cycle, trip.vehicle, model, seed))
+        trip = trip.with_forecast(wrong_forecast(trip.cycle, trip.believed, model, seed))
     check_outputs(json_file, out)
     with progress_bar(1) as bar:
         report = bar.next_job(f"{trip.cycle.name}, {controller}")

@@ -126,12 +126,15 @@ class Controller(Driver, ABC):
     """
 
     implementation: str = "python"
+    reads_fuel: bool = False  # the fuel injected, to learn from it
     # true if the commands are already admissible, or must be applied unchanged
     has_safety_layer: ClassVar[bool] = False
     # true if it checks its measurements itself, or needs none
     has_monitor: ClassVar[bool] = False
     # whether it decides from second to second, so that step times are meaningful
     decides_online: ClassVar[bool] = True
+    # whether it is made of the truth, not of the trip as believed: the optimum, a replay
+    knows_plant: ClassVar[bool] = False
     _under_way: bool | None = None  # None as long as __init__ has not run
 
     def __init__(self, trip: Trip, settings: SettingsLike | None = None) -> None:
@@ -217,7 +220,7 @@ class Controller(Driver, ABC):
         """
         if self._under_way is None:
             raise base_not_called(self)
-        if not trip.same_as(self.trip):
+        if not (trip if self.knows_plant else trip.as_believed).same_as(self.trip):
             raise QpmpcError(
                 f"controller {self.name!r} was made for {self.trip!r} and cannot drive {trip!r}: "
                 "make one for this trip"

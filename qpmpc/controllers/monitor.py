@@ -4,6 +4,7 @@ The same in C: codegen/runtime/mpc_check.c. Described in docs/safety.md.
 """
 
 from enum import IntFlag
+from math import nan
 
 from qpmpc.trip import Observation
 from qpmpc.vehicle.capability import Capability
@@ -17,7 +18,7 @@ LONGEST_GAP_S = 20  # seconds that may be missed; beyond, or backwards, the cloc
 class Flag(IntFlag):
     """What was wrong in a second; the values are those of generated C."""
 
-    BAD_MEASUREMENT = 1  # of soc, t_cl_degc, engine_on, demand_w or speed_mps
+    BAD_MEASUREMENT = 1  # of soc, t_cl_degc, engine_on, demand_w, speed_mps; fuel_g if it is read
     BAD_PREVIEW = 2  # the last good one is used as long as it reaches
     SOLVER_FAILED = 4  # no usable solution
     WARMING_UP = 8  # the solver has not converged yet since a cold start
@@ -45,7 +46,14 @@ class InputMonitor:
     Parameters
     ----------
     plant : of the car; its state is never touched
+
+    Attributes
+    ----------
+    fuel_most_g : more fuel than a second can take, of a controller that reads the fuel injected;
+        what is not plausible becomes not a number. None: it is not read, and not checked
     """
+
+    fuel_most_g: float | None = None
 
     def __init__(self, plant: Plant) -> None:
         self._plant = plant
@@ -85,7 +93,9 @@ class InputMonitor:
         self._t_cl_since_s = 0 if good_t_cl else since
         good_demand = can.demand_min_w <= seen.demand_w <= can.demand_max_w
         good_speed = 0.0 <= seen.speed_mps <= can.speed_max_mps
-        if not (good_soc and good_t_cl and good_demand and good_speed):
+        fuel_g, most_g = seen.fuel_g, self.fuel_most_g
+        good_fuel = most_g is None or 0.0 <= fuel_g <= most_g
+        if not (good_soc and good_t_cl and good_demand and good_speed and good_fuel):
             flags |= Flag.BAD_MEASUREMENT
         engine_for_s, p_eng_before_w = self._engine_before(seen, elapsed, first)
         self._good = Observation(
@@ -97,6 +107,7 @@ class InputMonitor:
             seen.speed_mps if good_speed else self._good.speed_mps,
             engine_for_s,
             p_eng_before_w,
+            fuel_g if good_fuel else nan,
         )
         return self._good, flags
 

@@ -13,7 +13,8 @@ from qpmpc.controllers.receding_horizon import Plan, Planner, power_while_on_w
 from qpmpc.controllers.settings import ControllerSettings, MhQpSettings, SettingsLike
 from qpmpc.errors import InputError
 from qpmpc.preview.stages import Stages
-from qpmpc.pwa.model import PwaModel
+from qpmpc.pwa.learned_fuel import LearnedFuel
+from qpmpc.pwa.model import PwaModel, learned_fuel
 from qpmpc.qp.expectation import expectation
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.polish import Polish
@@ -91,6 +92,7 @@ class QpPlanner(Planner):
     ----------
     last : last usable solution, None after a reset
     ready : whether the plan may be acted on
+    learned_fuel : what is learned of the fuel curve, None without `learning`
 
     Raises
     ------
@@ -116,9 +118,11 @@ class QpPlanner(Planner):
         self.on_solve = on_solve
         vehicle = trip.vehicle
         self.preview = trip.preview(self.of_qp.horizon)
-        self.model = PwaModel.of(vehicle, self.of_qp.pwa)
+        learning = self.of_qp.learning
+        self.model = PwaModel.of(vehicle, self.of_qp.pwa, learning)
+        self.learned_fuel = learned_fuel(vehicle, self.of_qp.pwa) if learning else None
         self.qp = StageQp(
-            vehicle, self.model, self.preview.count, self.of_qp.qp, self.of_qp.scaling
+            vehicle, self.model, self.preview.count, self.of_qp.qp, self.of_qp.scaling, learning
         )
         self._polish = Polish(vehicle, self.model)
         self._ramp = RampFloor(vehicle)
@@ -152,6 +156,11 @@ class QpPlanner(Planner):
 
     def plan(self, seen: Observation) -> Plan:
         """Spend one step's iterations on the QP of this second."""
+        if self.learned_fuel is not None:
+            if seen.engine_on:
+                started = seen.engine_for_s == 1
+                self.learned_fuel.take(seen.fuel_g, seen.p_eng_before_w, seen.t_cl_degc, started)
+            self._use(self.learned_fuel)
         solved = self.solve(seen)
         iterations = solved.solution.iterations
         if not solved.solution.usable:
@@ -204,7 +213,17 @@ class QpPlanner(Planner):
     def forget(self) -> None:
         """Forget solution and preview, as after a restart of the controller under way."""
         self.preview.forget()
+        if self.learned_fuel is not None:
+            self.learned_fuel.forget()
+            self._use(self.learned_fuel)
         self._start_cold()
+
+    def _use(self, learned: LearnedFuel) -> None:
+        """Plan with the fuel curve as it is known now."""
+        curve = learned.curve
+        self.model = replace(self.model, fuel=curve)
+        self.qp.learn(curve)
+        self._polish.learn(curve)
 
     def _start_cold(self) -> None:
         self.last, self._solves, self._failures = None, 0, 0

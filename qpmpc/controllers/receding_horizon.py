@@ -143,6 +143,9 @@ class RecedingHorizon(Controller):
             self.name = planner.name
         self.solver_name = planner.solver_name
         rules = last_rung(self.settings.rule_based, trip.vehicle)
+        learned = getattr(planner, "learned_fuel", None)
+        self.reads_fuel = learned is not None
+        self.monitor.fuel_most_g = None if learned is None else learned.most_g
         self._rules = RuleBased(trip, self.settings, rules)
         self._old: Plan | None = None
         self._old_step = 0

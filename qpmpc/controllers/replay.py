@@ -12,6 +12,7 @@ class Replay(Controller):
     """Plans all commands of a trip at departure and replays them whatever the plant does."""
 
     has_monitor = has_safety_layer = True  # a plan made with the plant itself is applied unchanged
+    knows_plant = True
     decides_online = False
     _commands: Sequence[Command] = ()
 

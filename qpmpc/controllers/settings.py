@@ -81,6 +81,7 @@ class MhQpSettings(BaseModel):
         battery's own curve, see `qpmpc.qp.polish`
     prepared : solve the first QP before the trip starts; if not, the rules drive the first steps
         while the solver warms up
+    learning : correct level and tilt of the fuel map by the fuel injected, see `LearnedFuel`
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -94,6 +95,7 @@ class MhQpSettings(BaseModel):
     solver: str | None = None
     polish: bool = True
     prepared: bool = True
+    learning: bool = False
 
 
 PAPER = MhQpSettings(

@@ -119,6 +119,8 @@ class Injection:
         """Return why a fault cannot reach the controller; empty if it can."""
         if not self._controller.decides_online and (fault.signal or fault.kind == "reset"):
             return "replays commands, whatever it is shown"
+        if fault.signal == "fuel_g" and not self._controller.reads_fuel:
+            return "does not read the fuel injected"
         if fault.kind in OF_PREVIEW and "preview" not in parts:
             return "has no preview that faults can be injected into"
         if fault.kind == "solver-failure" and "solver" not in parts:

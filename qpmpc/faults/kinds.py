@@ -2,7 +2,7 @@
 
 from typing import Literal, NamedTuple
 
-SignalName = Literal["soc", "t_cl_degc", "demand_w", "speed_mps", "engine_on", "second"]
+SignalName = Literal["soc", "t_cl_degc", "demand_w", "speed_mps", "fuel_g", "engine_on", "second"]
 KindName = Literal[
     "nan",
     "offset",
@@ -22,7 +22,8 @@ KindName = Literal[
     "late",
 ]
 MEASURED: tuple[SignalName, ...] = ("soc", "t_cl_degc", "demand_w", "speed_mps")
-SIGNALS: tuple[SignalName, ...] = (*MEASURED, "engine_on", "second")
+SENSED: tuple[SignalName, ...] = (*MEASURED, "fuel_g")  # the last by some controllers only
+SIGNALS: tuple[SignalName, ...] = (*SENSED, "engine_on", "second")
 
 
 class Kind(NamedTuple):
@@ -43,13 +44,13 @@ class Kind(NamedTuple):
 
 
 KINDS: dict[KindName, Kind] = {
-    "nan": Kind("the signal is not a number", MEASURED),
-    "offset": Kind("the signal is wrong by `value`", (*MEASURED, "second"), "error"),
-    "drift": Kind("the error grows by `value` every second", MEASURED, "error per second"),
+    "nan": Kind("the signal is not a number", SENSED),
+    "offset": Kind("the signal is wrong by `value`", (*SENSED, "second"), "error"),
+    "drift": Kind("the error grows by `value` every second", SENSED, "error per second"),
     "stuck": Kind("the signal stays at what it was in the second `at_s`", SIGNALS),
     "jump": Kind("the signal is `value`", SIGNALS, "what is seen instead"),
     "delay": Kind(
-        "the signal is that of `value` seconds before", (*MEASURED, "engine_on"), "seconds", True
+        "the signal is that of `value` seconds before", (*SENSED, "engine_on"), "seconds", True
     ),
     "missing": Kind("no preview arrives"),
     "stale": Kind("the preview of the second `at_s` arrives again"),

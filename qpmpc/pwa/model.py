@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from qpmpc.pwa.fit import PwaFit, fit_convex
+from qpmpc.pwa.learned_fuel import LearnedFuel
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.engine import OptimalLine, alpha, optimal_line
 from qpmpc.vehicle.engine_parameters import ColdEngine, Engine
@@ -61,12 +62,18 @@ class PwaModel:
     line: OptimalLine
 
     @classmethod
-    def of(cls, vehicle: Vehicle, tolerances: PwaTolerances | None = None) -> "PwaModel":
-        """Fit the PWA curves of a vehicle."""
+    def of(
+        cls, vehicle: Vehicle, tolerances: PwaTolerances | None = None, learning: bool = False
+    ) -> "PwaModel":
+        """Fit the PWA curves of a vehicle; `learning`: that of fuel is a `LearnedFuel`'s first."""
         tol = tolerances or PwaTolerances()
+        if learning:
+            fuel = learned_fuel(vehicle, tol).curve
+        else:
+            fuel = _fuel(vehicle.engine, tol.fuel_g_per_s, tol.fuel_knee_w)
         soc = vehicle.trip.soc_mean
         return cls(
-            fuel=_fuel(vehicle.engine, tol.fuel_g_per_s, tol.fuel_knee_w),
+            fuel=fuel,
             battery=_battery(vehicle.battery, soc, tol.battery_w, tol.battery_share),
             alpha=_alpha(vehicle.cold_engine, *_alpha_range_degc(vehicle), tol.alpha),
             battery_energy_j=BatteryMaps(vehicle.battery).energy_j(soc),
@@ -74,10 +81,23 @@ class PwaModel:
         )
 
 
+def learned_fuel(vehicle: Vehicle, tol: PwaTolerances) -> LearnedFuel:
+    """Return what learns the fuel curve of a vehicle."""
+    line = optimal_line(vehicle.engine)
+    allowed = _allowed_g_per_s(line, tol.fuel_g_per_s, tol.fuel_knee_w)
+    return LearnedFuel(vehicle.engine, vehicle.cold_engine, line, allowed)
+
+
+def _allowed_g_per_s(
+    line: OptimalLine, tolerance_g_per_s: float, knee_w: float
+) -> NDArray[np.float64]:
+    return tolerance_g_per_s * np.maximum(line.power_w / knee_w, 1.0) ** 2
+
+
 @lru_cache(maxsize=FITS_KEPT)
 def _fuel(engine: Engine, tolerance_g_per_s: float, knee_w: float) -> PwaFit:
     line = optimal_line(engine)
-    allowed = tolerance_g_per_s * np.maximum(line.power_w / knee_w, 1.0) ** 2
+    allowed = _allowed_g_per_s(line, tolerance_g_per_s, knee_w)
     return fit_convex(line.power_w, line.fuel_g_per_s, allowed)
 
 

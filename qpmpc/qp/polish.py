@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from qpmpc.pwa.fit import PwaFit
 from qpmpc.pwa.model import PwaModel
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.parameters import Vehicle
@@ -54,11 +55,15 @@ class Polish:
 
     def __init__(self, vehicle: Vehicle, model: PwaModel) -> None:
         maps, soc = BatteryMaps(vehicle.battery), vehicle.trip.soc_mean
-        self._vehicle, self._slope = vehicle, model.fuel.slope
-        self._begin_w = model.fuel.breakpoints[:-1]
+        self._vehicle = vehicle
+        self.learn(model.fuel)
         square = maps.open_circuit.at(soc) ** 2
         self._discharge_w = square / (4.0 * maps.discharge.at(soc))
         self._charge_w = square / (4.0 * maps.charge.at(soc))
+
+    def learn(self, fuel: PwaFit) -> None:
+        """Use another fuel curve from now on."""
+        self._slope, self._begin_w = fuel.slope, fuel.breakpoints[:-1]
 
     def power_w(self, prices: Prices, net_w: float, planned_w: float) -> float:
         """Return that power, or `planned_w` where a charge in the battery has no price."""

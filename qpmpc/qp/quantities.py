@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.preview.stages import Stages
+from qpmpc.pwa.fit import PwaFit
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp import rows
 from qpmpc.qp.coolant import thermostat_step
@@ -39,6 +40,15 @@ def pieces_of(model: PwaModel) -> dict[str, Floats]:
     }
 
 
+LEARNED = ("fuel_slope", "fuel_intercept", "fuel_idle_g_per_s", "fuel_chord_g_per_j")
+
+
+def fuel_chord(fuel: PwaFit, power_max_w: float) -> dict[str, float]:
+    """Chord of the fuel curve, from idling to full power."""
+    idle, full = map(float, fuel(np.array([0.0, power_max_w])))
+    return {"fuel_idle_g_per_s": idle, "fuel_chord_g_per_j": (full - idle) / power_max_w}
+
+
 class Quantities:
     """Evaluates expressions of the table; constant ones are evaluated once.
 
@@ -49,10 +59,16 @@ class Quantities:
     parameters : numbers by name, see `qp_parameters`
     vehicle, model : of the plant and of the PWA curves
     stages : n
+    learning : whether the fuel curve changes from step to step, too
     """
 
     def __init__(
-        self, parameters: Mapping[str, float], vehicle: Vehicle, model: PwaModel, stages: int
+        self,
+        parameters: Mapping[str, float],
+        vehicle: Vehicle,
+        model: PwaModel,
+        stages: int,
+        learning: bool = False,
     ) -> None:
         thermal, least = vehicle.thermal, parameters["t_min_degc"]
         self._floor = CoolantFloor(vehicle, model.line, parameters["battery_energy_j"], least)
@@ -75,7 +91,7 @@ class Quantities:
             "pwa_battery": model.battery,
             "thermostat_step": partial(thermostat_step, thermal),
         }
-        self._changing = set(INPUTS)
+        self._changing = {*INPUTS, *(LEARNED if learning else ())}
         each_step: list[ast.stmt] = []
         for line in parsed(rows.QUANTITIES):
             if self.is_changing(line):
@@ -105,6 +121,12 @@ class Quantities:
         names["highest_floor_degc"] = floor.max()
         exec(self._each_step, names)
         return names
+
+    def learn(self, fuel: PwaFit, power_max_w: float) -> None:
+        """Take another fuel curve."""
+        self._names |= fuel_chord(fuel, power_max_w)
+        self._names["fuel_slope"] = fuel.slope[None, :]
+        self._names["fuel_intercept"] = fuel.intercept[None, :]
 
     def value(self, code: CodeType) -> Any:
         """Evaluate an expression with the values of the last update."""

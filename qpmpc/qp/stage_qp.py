@@ -10,12 +10,13 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from qpmpc.errors import InputError
 from qpmpc.preview.stages import Stages
+from qpmpc.pwa.fit import PwaFit
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.expressions import code_of, expression
 from qpmpc.qp.heat_reserve import heat_reserve_k
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.polish import Prices
-from qpmpc.qp.quantities import Quantities
+from qpmpc.qp.quantities import Quantities, fuel_chord
 from qpmpc.qp.rows import SHORTEST_SCALE_S, VARIABLES, Rows, Var, table_of
 from qpmpc.qp.scaling import Scaling, ScalingSettings
 from qpmpc.qp.structure import QpStructure
@@ -101,19 +102,13 @@ def qp_parameters(
             f"{soc_high:g}"
         )
     crank_j = cranking_j(vehicle, model)
-    # the chord of the fuel curve, from idling to full power
-    idle, full = (
-        float((model.fuel.slope * power + model.fuel.intercept).max())
-        for power in (0.0, engine.power_max_w)
-    )
     return {
         "engine_max_w": engine.power_max_w,
         "engine_min_w": engine.power_min_w,
         "lhv_j_per_g": engine.lhv_j_per_g,
         "start_fuel_g": engine.start_fuel_g,
         "cranking_j": crank_j,
-        "fuel_idle_g_per_s": idle,
-        "fuel_chord_g_per_j": (full - idle) / engine.power_max_w,
+        **fuel_chord(model.fuel, engine.power_max_w),
         **{name: float(value) for name, value in thermal.model_dump().items()},
         "battery_energy_j": model.battery_energy_j,
         "battery_discharge_max_w": battery.power_discharge_max_w,
@@ -167,6 +162,7 @@ class StageQp:
     vehicle, model : plant parameters and the PWA curves made from them
     stages : number of stages n
     settings, scaling : weights and units
+    learning : whether the fuel curve will be replaced, see `learn`
     """
 
     def __init__(
@@ -176,6 +172,7 @@ class StageQp:
         stages: int,
         settings: QpSettings,
         scaling: ScalingSettings,
+        learning: bool = False,
     ) -> None:
         self.vehicle, self.model, self.settings, self.units = vehicle, model, settings, scaling
         self.table = table_of(vehicle.engine)
@@ -183,7 +180,7 @@ class StageQp:
         self.structure = QpStructure(stages, self.rows)
         self.stages = stages
         parameters = qp_parameters(vehicle, model, settings, scaling)
-        self._quantities = Quantities(parameters, vehicle, model, stages)
+        self._quantities = Quantities(parameters, vehicle, model, stages, learning)
         self._values = np.empty((stages, len(self.structure.index)))
         self._lower = np.full((stages, self.rows.count), -np.inf)
         self._upper = np.full((stages, self.rows.count), np.inf)
@@ -262,6 +259,10 @@ class StageQp:
             else:
                 cost[:, [entry.var]] += value(weight)
         return self._scaled(stages.duration_s, cost)
+
+    def learn(self, fuel: PwaFit) -> None:
+        """Use another fuel curve, of as many pieces, from the next update on."""
+        self._quantities.learn(fuel, self.vehicle.engine.power_max_w)
 
     def prices(self, duals: Floats) -> Prices:
         """Return what the rates of the first second cost at the last update's values.

@@ -15,6 +15,7 @@ from qpmpc.registry import check_controllers, split_settings
 from qpmpc.remarks import say_once
 from qpmpc.study.definition import OF_RUN, TRUE_FORECAST, Study, with_seed
 from qpmpc.vehicle import Vehicle, load_vehicle
+from qpmpc.vehicle.belief import with_settings
 from qpmpc.vehicle.names import DEFAULT_VEHICLE, VEHICLES
 
 CACHED = 64
@@ -106,4 +107,4 @@ def _check_settings(study: Study, controllers: list[str], vehicles: list[Vehicle
     for together in [*({**first, **point} for point in points), *each]:
         of_vehicle, _ = split_settings(together, controllers)
         for vehicle in vehicles if of_vehicle else []:
-            vehicle.with_settings(of_vehicle)
+            with_settings(vehicle, None, of_vehicle)

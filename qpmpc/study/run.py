@@ -83,13 +83,11 @@ def row_of(parameters: Parameters, inputs: Inputs) -> tuple[dict[str, Any], Run 
 def _trip(parameters: Parameters, inputs: Inputs) -> tuple[Trip, ControllerSettings]:
     of_vehicle, chosen = split_settings(parameters.settings, [parameters.controller])
     cycle = inputs.cycle(parameters.cycle)
-    vehicle = inputs.vehicle(parameters.vehicle)
-    if of_vehicle:
-        vehicle = vehicle.with_settings(of_vehicle)
-    guess = None
+    trip = Trip(cycle, inputs.vehicle(parameters.vehicle)).with_settings(of_vehicle)
     if parameters.forecast != TRUE_FORECAST:
-        guess = forecast(cycle, vehicle, parameters.forecast, parameters.seed)
-    return Trip(cycle, vehicle, guess), chosen
+        guess = forecast(cycle, trip.believed, parameters.forecast, parameters.seed)
+        trip = trip.with_forecast(guess)
+    return trip, chosen
 
 
 def lost_row(parameters: Parameters, reason: str) -> dict[str, Any]:

@@ -25,6 +25,7 @@ class PlantState(NamedTuple):
     engine_on : whether the engine ran in the last step
     engine_for_s : whole seconds since it was started or stopped
     p_eng_w : its power in the last step, 0 with the engine off
+    fuel_g : injected in the last step
     """
 
     soc: float
@@ -32,6 +33,7 @@ class PlantState(NamedTuple):
     engine_on: bool = False
     engine_for_s: int = LONG_AGO_S
     p_eng_w: float = 0.0
+    fuel_g: float = 0.0
 
 
 class Command(NamedTuple):
@@ -165,6 +167,7 @@ class Plant:
             on,
             min(state.engine_for_s + 1, LONG_AGO_S) if on == state.engine_on else 1,
             p_eng,
+            fuel_g,
         )
         flows = StepFlows(
             fuel_g=fuel_g,

@@ -77,7 +77,7 @@ def on_target(trip: Trace, folder: Path) -> tuple[float, np.ndarray, list[object
     count = f"-icount shift={ICOUNT_SHIFT},sleep=off"
     command = [QEMU, *f"{machine} {semihosting} {count} -kernel {elf}".split()]
     subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, check=True, timeout=300)
-    kind, _ = structures("f32", values.sizes.short_stages, values.sizes.long_stages)
+    kind, _ = structures("f32", values.sizes.short_stages, values.sizes.long_stages, False)
     record = np.dtype([("ticks", "<u4"), ("in", kind)])
     data = (folder / "answer").read_bytes()
     records = np.frombuffer(data[4:], dtype=record)
@@ -103,7 +103,7 @@ def test_cost_on_the_target_is_as_documented_and_does_not_grow_with_the_trip(tmp
     assert start / wltc.steps == pytest.approx(a_start, rel=0.03)
     double = Trace(*(x.astype(float) for x in (single.demand_w, single.speed_mps)))
     python = InputBuilder(StageBuilder(CAR, double, double, HORIZON).preview)
-    want, _ = structures("f64", HORIZON.short_stages, HORIZON.classes * HORIZON.blocks)
+    want, _ = structures("f64", HORIZON.short_stages, HORIZON.classes * HORIZON.blocks, False)
     want = want()
     for step, have in enumerate(inputs):
         python.fill(Observation(step, 0.6, 50.0, False, 0.0, 0.0), want)

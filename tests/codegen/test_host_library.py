@@ -98,12 +98,32 @@ def test_primal_and_dual_variables_equal_python() -> None:
         ("prius-nimh", {"mh_qp__horizon__classes": 1, "mh_qp__horizon__short_stages": 12}),
         ("prius-nimh", {"mh_qp__horizon__blocks": 0, "mh_qp__horizon__block_s": 100}),
         ("prius-nimh", {"mh_qp__prepared": False}),
+        ("prius-liion", {"mh_qp__learning": True}),
     ],
 )
 def test_other_vehicles_and_settings_equal_python(vehicle, overrides) -> None:
     trip, ours, reference = pair("nycc", vehicle=load_vehicle(vehicle), **overrides)
     for mine, its in compare(trip, ours, reference, 120):
         assert_equal_decision(mine, its, power_w=1e-2)
+
+
+def test_what_is_learned_equals_python() -> None:
+    """A wrong map, and a meter that fails from second to second and at departure."""
+    trip = Trip("nycc").with_settings({"model.fuel_tilt": -0.1})
+    settings = settings_of(mh_qp__learning=True)
+    mine = GeneratedController(trip.as_believed, settings)
+    its = MhQp(trip.as_believed, settings)
+    state = trip.plant.initial_state()
+    for second in range(200):
+        seen = trip.observation(second, state)
+        if second % 7 == 0:
+            seen = seen._replace(fuel_g=(math.nan, -1.0, 1e3, 0.4)[second % 4])
+        ours, reference = mine.decide(seen), its.decide(seen)
+        assert_equal_decision(ours, reference, power_w=1e-2)
+        assert (Flag.BAD_MEASUREMENT in ours.flags) == (second % 28 in (0, 14, 21))
+        state, _ = trip.plant.step(state, reference.command, seen.demand_w, seen.speed_mps)
+    assert its.planner.learned_fuel is not None
+    assert its.planner.learned_fuel.level_and_tilt[1] > 0.05
 
 
 @pytest.mark.parametrize(

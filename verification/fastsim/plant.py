@@ -60,15 +60,17 @@ class FastsimPlant:
         on, p_eng_w = bool(engine["fc_on"]), float(engine["pwr_prop_watts"])
         off_w = abs(p_eng_w - command.p_eng_w) if self._obeys else 0.0
         missing_w = self._note(car, command, off_w, demand_w, wanted_mps)
+        fuel_g = float(engine["pwr_fuel_watts"]) / self._vehicle.engine.lhv_j_per_g
         following = PlantState(
             float(battery["soc"]),
             state.t_cl_degc,
             on,
             min(state.engine_for_s + 1, LONG_AGO_S) if on == state.engine_on else 1,
             p_eng_w,
+            fuel_g,
         )
         flows = StepFlows(
-            fuel_g=engine["pwr_fuel_watts"] / self._vehicle.engine.lhv_j_per_g,
+            fuel_g=fuel_g,
             fuel_w=engine["pwr_fuel_watts"],
             p_eng_w=p_eng_w,
             p_bat_w=battery["pwr_out_electrical_watts"],
