@@ -15,7 +15,7 @@ from qpmpc.codegen.examples import example_files
 from qpmpc.codegen.osqp_source import CONSTANT_ARRAYS, PREFIX, osqp_files, osqp_version
 from qpmpc.codegen.prefix import checked_prefix, with_prefix
 from qpmpc.codegen.rows.solver_c import rows_files
-from qpmpc.codegen.values import CONSTANTS, Values
+from qpmpc.codegen.values import CONSTANTS, OF_LEARNING, Values
 from qpmpc.errors import InputError
 from qpmpc.files import check_folder, write_text
 
@@ -196,7 +196,7 @@ def _context(
         "sizes": values.sizes,
         "constants": [
             (module, [(name, _count_or(literal, value)) for name, value in names.items()])
-            for module, names in CONSTANTS.items()
+            for module, names in (CONSTANTS | (OF_LEARNING if values.learning else {})).items()
         ],
         "scalars": scalars | counts,
         "counts": counts,

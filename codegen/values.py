@@ -45,12 +45,21 @@ CONSTANTS: dict[str, dict[str, float]] = {
         (swing, "NO_LIMIT_J LEAST_KEPT_J"),
         (stage_qp, "LEAST_COST"),
         (polish, "LEAST_RATIO"),
-        (learned_fuel, "KEPT PRIOR_S LEVEL_MOST TILT_MOST RATIO_LEAST RATIO_MOST SUM_MOST"),
         (coolant_floor, "USABLE"),
         (rows, "SHORTEST_SCALE_S SIGMA_FORCED COOL_SHARE MOOT_G_PER_S"),
         (base, "LARGEST_PLAUSIBLE"),
         (demand, "GRAVITY_MPS2"),
     )
+}
+
+OF_LEARNING = {  # beside those, where the fuel map is learned
+    learned_fuel.__name__: {
+        name: getattr(learned_fuel, name)
+        for name in (
+            *("KEPT", "PRIOR_S", "LEVEL_MOST", "TILT_MOST"),
+            *("RATIO_LEAST", "RATIO_MOST", "SUM_MOST"),
+        )
+    }
 }
 
 
