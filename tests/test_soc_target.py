@@ -59,13 +59,18 @@ def test_less_charge_at_arrival_costs_less_fuel_by_what_it_is_worth(short):
 
 
 @pytest.mark.parametrize("asked", [EMPTIER, FULLER], ids=["emptier", "fuller"])
-def test_near_the_optimum_and_not_below_the_proven_bound(short, asked):
+def test_near_the_optimum(short, asked):
     trip = Trip(short, load_vehicle("prius-liion").with_settings(asked))
     optimum = simulate(trip, "dp", settings=QUICK)
     run = simulate(trip, "mh-qp")
     # measured 0.2 and 0.3 %; shipped cycles without a target of their own are at 0.1 to 0.5 %
     assert run.fuel_soc_balanced_g < 1.006 * optimum.fuel_soc_balanced_g
+
+
+def test_the_proven_bound_knows_what_the_battery_is_to_give(short):
+    trip = Trip(short, load_vehicle("prius-liion").with_settings(EMPTIER))
     bound = lower_bound(trip.cycle, trip.vehicle)
+    optimum = simulate(trip, "dp", settings=QUICK)
     assert 0.95 * optimum.fuel_g < bound.fuel_g <= optimum.fuel_g
 
 
