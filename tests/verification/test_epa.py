@@ -2,12 +2,20 @@
 
 import pytest
 
-from qpmpc.verification.checks.epa import CASES, TOLERANCE, main, model_mpg
+from qpmpc.cycles import load_cycle
+from qpmpc.verification.checks.epa import CASES, TOLERANCE, US06, main, model_mpg
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_model_reproduces_its_reference(case):
     assert model_mpg(case) == pytest.approx(case.reference_mpg, rel=TOLERANCE)
+
+
+def test_us06_is_the_published_schedule():
+    """EPA: 8.01 mi, 80.3 mph at most."""
+    cycle = load_cycle(US06)
+    assert cycle.distance_m / 1609.344 == pytest.approx(8.01, abs=0.005)
+    assert cycle.speed_mps.max() / 0.44704 == pytest.approx(80.3, abs=0.05)
 
 
 def test_the_command_shows_both_figures(capsys):
