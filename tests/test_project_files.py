@@ -14,6 +14,19 @@ FORMS = sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml"))
 FORM_TYPES = {"markdown", "input", "textarea", "dropdown", "checkboxes"}
 
 
+PARTS = ("qpmpc", "cycles", "codegen", "verification", "docs", "examples", "tests")
+TEXTS = {".py", ".j2", ".md", ".toml", ".csv", ".c", ".h", ".cfg", ".yml"}
+
+
+def test_no_merge_was_left_half_done():
+    files = [path for part in PARTS for path in (ROOT / part).rglob("*") if path.suffix in TEXTS]
+    files += [path for path in ROOT.iterdir() if path.suffix in TEXTS or path.name == "Makefile"]
+    assert len(files) > 300
+    for path in files:
+        text = path.read_text("utf-8", errors="replace")
+        assert not re.search(r"^(<{7}|>{7}) ", text, re.MULTILINE), path
+
+
 def parsed(path):
     return yaml.safe_load(path.read_text("utf-8"))
 
