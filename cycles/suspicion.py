@@ -14,7 +14,6 @@ from qpmpc.cycles.plausibility import (
     GAP_STANDING_MAX_S,
     GRADE_MEAN_MAX,
     STANDING_MPS,
-    TO_MPS,
 )
 
 POWER_P95_WPKG = 26.0
@@ -58,13 +57,15 @@ GRADE_WAY_MIN_M = 1000.0
 CLIMB_MEAN_MPS = 2.0
 """Height per second of driving, up or down: a pass of 10 % at 70 km/h."""
 
+UNIT_DOUBTED = "is the unit of speed right? km/h read as m/s are 3.6 times too fast, mph 2.2 times"
+
 
 def suspicions(cycle: Cycle) -> list[str]:
     """Return what is unusual about a cycle: a line each on its motion, its stops and its road."""
     brisk, road = _brisk(cycle), _road(cycle)
     lines = []
     if brisk:
-        lines.append(f"unusual for a car: {', '.join(brisk)}; are the speeds in m/s? {TO_MPS}")
+        lines.append(f"unusual for a car: {', '.join(brisk)}; {UNIT_DOUBTED}")
     calm_mps2 = _around_stops_mps2(cycle)
     if calm_mps2 < CALM_MPS2:
         lines.append(

@@ -3,18 +3,23 @@
 import csv
 import io
 import re
-from dataclasses import dataclass
+from collections import Counter
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.errors import InputError
-from qpmpc.input_text import read_text
+from qpmpc.input_text import read_table_text
 from qpmpc.problems import shown_value
 
 SEPARATORS = (";", "\t", ",")
 COMMENT = "#"
+ABSENT = ("", "nan", "null", "n/a")
+"""What programs write where they have no value; and dashes."""
+
+SAMPLED = 100  # lines by which the width of a table is judged
 _UNIT_IN_TITLE = (
     re.compile(r"^(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*$"),  # BSFC [g/(kWh)]
     re.compile(r"^(?P<name>.*?)\s*\((?P<unit>[^()]*)\)\s*$"),  # Speed (OBD)(km/h)
@@ -52,6 +57,7 @@ class DelimitedTable:
     lines : line of each row in the file
     titles : how many lines above the header were left out
     decimal_comma : whether a comma in a number is its decimal point
+    assumed : about the text, in a line; empty if nothing
     """
 
     path: Path
@@ -59,18 +65,19 @@ class DelimitedTable:
     lines: tuple[int, ...]
     titles: int
     decimal_comma: bool
+    assumed: str = ""
 
-    def numbers(self, column: Column, absent: tuple[str, ...] = ("",)) -> NDArray[np.float64]:
+    def numbers(self, column: Column) -> NDArray[np.float64]:
         """Convert a column; shape (rows,), NaN where a cell says that there is no number.
 
         Raises
         ------
         InputError
-            At the first cell that is neither a finite number nor one of `absent`.
+            At the first cell that is neither a finite number nor absent.
         """
         found = np.full(len(self.lines), np.nan)
         for k, cell in enumerate(column.cells):
-            if cell.lower() in absent:
+            if is_absent(cell):
                 continue
             value = self.number(cell)
             if value is None:
@@ -88,7 +95,13 @@ class DelimitedTable:
 
 def read_delimited(path: Path, megabytes: int) -> DelimitedTable:
     """Read a table from a file; see `parse_delimited`."""
-    return parse_delimited(path, read_text(path, megabytes))
+    text, assumed = read_table_text(path, megabytes)
+    return replace(parse_delimited(path, text), assumed=assumed)
+
+
+def is_absent(cell: str) -> bool:
+    """Whether a cell says that there is no value."""
+    return cell.lower() in ABSENT or not cell.strip("-")
 
 
 def header_names(text: str) -> list[str]:
@@ -105,7 +118,8 @@ def header_names(text: str) -> list[str]:
 def parse_delimited(path: Path, text: str) -> DelimitedTable:
     """Parse a table: lines of title, a header, maybe a row of units, and rows.
 
-    The header is the first line with two cells or more. They are separated by semicolons, tabs or
+    The header is the first line with two cells or more, or, where most lines have more cells than
+    that one, the first which has as many and no number. They are separated by semicolons, tabs or
     commas, whichever it has first in that order; with semicolons or tabs a decimal comma is one.
     Lines that begin with # and blank lines do not count.
 
@@ -152,7 +166,23 @@ def _table_lines(text: str) -> tuple[list[tuple[int, str]], int]:
         if line.strip(" \t;,") and not line.lstrip().startswith(COMMENT)
     ]
     first = next((k for k, (_, line) in enumerate(lines) if any(s in line for s in SEPARATORS)), 0)
+    first += _titles_of_several_cells(lines[first : first + SAMPLED])
     return lines[first:], first
+
+
+def _titles_of_several_cells(lines: list[tuple[int, str]]) -> int:
+    """How many lines with a separator are above the header, since they are narrower than most."""
+    if not lines:
+        return 0
+    separator = _separator(lines[-1:])
+    rows = [line.rstrip(" \t;,").split(separator) for _, line in lines]
+    most = Counter(map(len, rows)).most_common(1)[0][0]
+    if len(rows[0]) >= most:
+        return 0
+    for k, row in enumerate(rows):
+        if len(row) >= most and all(_number(cell, separator != ",") is None for cell in row):
+            return k
+    return 0
 
 
 def _separator(lines: list[tuple[int, str]]) -> str:

@@ -58,6 +58,37 @@ def read_text(path: str | os.PathLike[str], megabytes: int, prefix: str = "") ->
     InputError
         If the name is impossible, or the file cannot be read, is too large, or is not text.
     """
+    text = _decoded(_content(path, megabytes, prefix), "utf-8-sig")
+    if text is None:
+        raise InputError(f"{prefix}{path}: must be plain text in UTF-8")
+    return text
+
+
+def read_table_text(path: str | os.PathLike[str], megabytes: int) -> tuple[str, str]:
+    """Read the text of a table, which bench and spreadsheet programs write in Windows-1252 too.
+
+    Numbers are the same in both; titles with an umlaut or a degree sign are not.
+
+    Returns
+    -------
+    The text, and what was assumed about it in a line; empty for UTF-8.
+
+    Raises
+    ------
+    InputError
+        As of `read_text`; if it is neither.
+    """
+    content = _content(path, megabytes)
+    text = _decoded(content, "utf-8-sig")
+    if text is not None:
+        return text, ""
+    text = _decoded(content, "cp1252")
+    if text is None:
+        raise InputError(f"{path}: must be plain text in UTF-8 or Windows-1252")
+    return text, "the text is not UTF-8: read as Windows-1252"
+
+
+def _content(path: str | os.PathLike[str], megabytes: int, prefix: str = "") -> bytes:
     check_path(path, prefix)
     limit = megabytes * 1_000_000
     try:
@@ -69,10 +100,13 @@ def read_text(path: str | os.PathLike[str], megabytes: int, prefix: str = "") ->
         raise InputError(f"{prefix}{path}: {reason}") from None
     if len(content) > limit:
         raise InputError(f"{prefix}{path}: larger than {megabytes} MB, the most that is read")
+    return content
+
+
+def _decoded(content: bytes, encoding: str) -> str | None:
+    """Text without null characters, or None."""
     try:
-        text = content.decode("utf-8-sig")
+        text = content.decode(encoding)
     except UnicodeDecodeError:
-        text = "\0"
-    if "\0" in text:
-        raise InputError(f"{prefix}{path}: must be plain text in UTF-8")
-    return text
+        return None
+    return None if "\0" in text else text

@@ -1,13 +1,14 @@
 """All errors in a set of parameters, in one line of bounded length."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 SHOWN = 8  # problems of one sort; a file with more is probably the wrong one
+NAMES_SHOWN = 5  # of the columns of a file
 LONGEST = 60  # characters of a key or value that are shown
 
 # pydantic's messages about Python's types, in the words of a TOML file
@@ -64,6 +65,14 @@ def shown_value(value: object) -> str:
         return "a number too long to show"
     except RecursionError:
         return "a value nested too deeply to show"
+
+
+def names_shown(titles: Sequence[str]) -> str:
+    """Return the first titles for a message."""
+    more = len(titles) - NAMES_SHOWN
+    return ", ".join(shown_value(title) for title in titles[:NAMES_SHOWN]) + (
+        f" and {more} more" if more > 0 else ""
+    )
 
 
 def _wrong(each: ErrorDetails, key: str, owner: str, origins: Mapping[str, str]) -> str:

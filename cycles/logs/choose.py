@@ -6,9 +6,7 @@ from pathlib import Path
 from qpmpc.cycles.logs.quantities import SPEED, LogOptions, Quantity
 from qpmpc.delimited import Column
 from qpmpc.errors import InputError
-from qpmpc.problems import shown_value
-
-NAMES_SHOWN = 5
+from qpmpc.problems import names_shown, shown_value
 
 
 def columns_of(
@@ -78,14 +76,6 @@ def names_unit(column: Column, quantity: Quantity, options: LogOptions) -> bool:
     """Whether the unit of a column is known."""
     name, unit = _split(column, quantity)
     return bool(unit or quantity.name in options.units or name in quantity.implied)
-
-
-def names_shown(titles: Sequence[str]) -> str:
-    """Return the first titles for a message."""
-    more = len(titles) - NAMES_SHOWN
-    return ", ".join(shown_value(title) for title in titles[:NAMES_SHOWN]) + (
-        f" and {more} more" if more > 0 else ""
-    )
 
 
 def _named(columns: Sequence[Column], quantity: Quantity) -> Iterator[Column]:

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 
 from qpmpc.cycles.cycle import Floats
-from qpmpc.cycles.logs.choose import columns_of, names_shown, scale_of
+from qpmpc.cycles.logs.choose import columns_of, scale_of
 from qpmpc.cycles.logs.columns import ASSUMED, LEFT_OUT, READ, LogColumns, Said
 from qpmpc.cycles.logs.extra import need
 from qpmpc.cycles.logs.quantities import ELEVATION, GRADE, SPEED, TIME, LogOptions, Quantity
 from qpmpc.delimited import Column, plain_unit, split_title
 from qpmpc.errors import InputError
 from qpmpc.input_text import check_path
-from qpmpc.problems import shown_value
+from qpmpc.problems import names_shown, shown_value
 
 MEGABYTES_MAX = 1000
 """Of which only the channels of a drive are read."""

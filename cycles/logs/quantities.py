@@ -45,7 +45,7 @@ SPEED = Quantity(
     "speed",
     (
         "speed", "v", "velocity", "vehicle_speed", "target_speed", "speed_obd", "gps_speed",
-        "cycmps", "vehiclespeed", "vehspd", "vehspeed", "veh_spd", "v_veh",
+        "speed_gps", "cycmps", "vehiclespeed", "vehspd", "vehspeed", "veh_spd", "v_veh",
     ),
     {
         "m/s": 1.0, "mps": 1.0, "m/sec": 1.0, "meters/second": 1.0, "meters_per_second": 1.0,
@@ -63,8 +63,9 @@ GRADE = Quantity(
 ELEVATION = Quantity(
     "elevation",
     (
-        "elevation", "altitude", "ele", "alt", "gps_altitude", "elevation_smoothed",
-        "elevation_raw",
+        "elevation", "altitude", "ele", "alt", "gps_altitude", "altitude_gps", "gps_alt", "alt_gps",
+        "gps_elevation", "elevation_gps", "gps_ele", "ele_gps",
+        "elevation_smoothed", "elevation_raw",
     ),
     {"m": 1.0, "meters": 1.0, "ft": 0.3048, "feet": 0.3048},
 )  # fmt: skip

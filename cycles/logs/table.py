@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from qpmpc.cycles.cycle import Floats
-from qpmpc.cycles.logs.choose import columns_of, names_shown, names_unit, scale_of
+from qpmpc.cycles.logs.choose import columns_of, names_unit, scale_of
 from qpmpc.cycles.logs.columns import ASSUMED, LEFT_OUT, READ, LogColumns, Said
 from qpmpc.cycles.logs.quantities import (
     ELEVATION,
@@ -17,12 +17,9 @@ from qpmpc.cycles.logs.quantities import (
     LogOptions,
     Quantity,
 )
-from qpmpc.delimited import Column, DelimitedTable, header_names, parse_delimited
+from qpmpc.delimited import Column, DelimitedTable, header_names, is_absent, parse_delimited
 from qpmpc.errors import InputError
-from qpmpc.problems import shown_value
-
-ABSENT = ("", "-", "nan", "null", "n/a")
-"""What loggers write where they have no value."""
+from qpmpc.problems import names_shown, shown_value
 
 OURS = ("time_s", "speed_mps", "grade", "elevation_m")  # of whose units nothing has to be said
 
@@ -87,6 +84,8 @@ def parse_log(path: Path, text: str, options: LogOptions = NOTHING_STATED) -> Lo
     for quantity, column in ((GRADE, grades), (ELEVATION, heights)):
         if column is None and quantity.name in options.units:
             raise InputError(f"{path}: {quantity.option}: there is no column of {quantity.name}")
+    if grades is None and heights is None:
+        said.append(Said(ASSUMED, "a level road: no column of grade or elevation"))
     trips, of_trips = _trips(table)
     taken = [times, speeds, grades, heights, *of_trips]
     left = [column.title for column in table.columns if column not in taken]
@@ -117,7 +116,7 @@ def _scaled(
     scale, unit = scale_of(table.path, column, quantity, options)
     if column.title not in OURS:
         said.append(Said(READ, f"{quantity.name} from {shown_value(column.title)}{unit}"))
-    return table.numbers(column, ABSENT) * scale
+    return table.numbers(column) * scale
 
 
 def _trips(table: DelimitedTable) -> tuple[tuple[str, ...] | None, list[Column]]:
@@ -137,7 +136,7 @@ def _trips(table: DelimitedTable) -> tuple[tuple[str, ...] | None, list[Column]]
 
 def _time_s(table: DelimitedTable, column: Column, options: LogOptions, said: list[Said]) -> Floats:
     """Seconds, from a number with a unit, or from dates."""
-    first = next((cell for cell in column.cells if cell.lower() not in ABSENT), "")
+    first = next((cell for cell in column.cells if not is_absent(cell)), "")
     if table.number(first) is not None:
         return _scaled(table, column, TIME, options, said)
     if TIME.name in options.units:
@@ -150,7 +149,7 @@ def _time_s(table: DelimitedTable, column: Column, options: LogOptions, said: li
     how = "times of day" if of_day else "dates"
     said.append(Said(READ, f"time from {shown_value(column.title)}, as {how}"))
     for k, cell in enumerate(column.cells):
-        if cell.lower() in ABSENT:
+        if is_absent(cell):
             continue
         found = _of_day(cell) if of_day else _date(cell)
         if found is None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from qpmpc.delimited import Column, DelimitedTable, read_delimited
 from qpmpc.errors import InputError
-from qpmpc.problems import shown_value
+from qpmpc.problems import names_shown, shown_value
 
 Floats = NDArray[np.float64]
 
@@ -18,8 +18,8 @@ POINTS_LEAST = 3
 EFFICIENCY_MAX = 0.6  # of any engine; more is a wrong unit
 
 # quantity -> names, and units -> size in SI; the unit may be the last part of the name too
-_SPEED = ("speed", "engine_speed", "rpm", "n", "omega")
-_TORQUE = ("torque", "engine_torque", "tau")
+_SPEED = ("speed", "engine_speed", "rpm", "n", "n_eng", "n_mot", "omega")
+_TORQUE = ("torque", "engine_torque", "trq", "md", "tau")
 _POWER = ("power", "engine_power", "p")
 _FUEL = ("fuel", "fuel_rate", "fuel_flow", "fuel_mass_flow", "consumption")
 _BSFC = ("bsfc", "be", "specific_consumption", "sfc")
@@ -100,7 +100,9 @@ def read_engine_data(path: Path, lhv_j_per_g: float) -> EngineData:
     """
     table = read_delimited(path, MEGABYTES_MAX)
     found, wrong = _quantities(table)
-    remarks: list[str] = []
+    remarks = [table.assumed] if table.assumed else []
+    if table.titles:
+        remarks.append(f"{table.titles} line(s) above the header not read")
     speed, torque = found.get("speed"), found.get("torque")
     if speed is not None and torque is not None:
         power = torque * speed * (np.pi / 30.0)
@@ -111,7 +113,8 @@ def read_engine_data(path: Path, lhv_j_per_g: float) -> EngineData:
         power = found["power"]
         drags, standing = power < 0.0, np.zeros(len(power), dtype=bool)
     else:
-        raise wrong or InputError(f"{path}: needs {ALLOWED}")
+        titles = names_shown([column.title for column in table.columns])
+        raise wrong or InputError(f"{path}: there are {titles}; needed are {ALLOWED}")
     hows = [how for how in ("fuel", "bsfc", "efficiency") if how in found]
     if not hows:
         raise wrong or InputError(f"{path}: needs one column of fuel, has none: {ALLOWED}")
@@ -124,7 +127,7 @@ def read_engine_data(path: Path, lhv_j_per_g: float) -> EngineData:
     without = (given == 0.0) | ((power == 0.0) & (how != "fuel"))
     left = np.zeros(len(power), dtype=bool)
     for rows, what in (
-        (unknown, "with an empty cell"),
+        (unknown, "without a value"),
         (standing, "at speed 0 or below"),
         (drags, "at which the engine is dragged"),
         (without, "without fuel" if how == "fuel" else f"without power or {how}"),

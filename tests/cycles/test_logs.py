@@ -73,9 +73,10 @@ def test_read(tmp_path: Path, name: str) -> None:
 def test_what_was_assumed_is_said(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(FILES["an OBD logger"])
-    assert [remark.removeprefix(f"{path}: ") for remark in load_cycle(path).remarks[:4]] == [
+    assert [remark.removeprefix(f"{path}: ") for remark in load_cycle(path).remarks[:5]] == [
         "time from 'Device Time', as dates",
         "speed from 'Speed (OBD)(km/h)', in km/h",
+        "a level road: no column of grade or elevation",
         "not read: 'GPS Time'",
         "2 of 17 rows without a value left out",
     ]
@@ -131,3 +132,25 @@ def test_any_text_is_read_or_refused_in_one_line(text: str, tmp_path_factory) ->
     except InputError as error:
         said = str(error)
     assert said.isprintable()
+
+
+def test_text_of_a_spreadsheet(tmp_path):
+    """Windows-1252: the same drive, and it is said."""
+    file = tmp_path / "log.csv"
+    text = "Zeit über alles;x\ntime_s;v_kmh;Kühlmittel °C\n" + rows(lambda k, v: f"{k};{3.6 * v};1")
+    text = text.replace(".", ",")
+    file.write_bytes(text.encode("cp1252"))
+    cycle = load_cycle(file)
+    assert cycle.speed_mps == pytest.approx(SPEED_MPS)
+    assert f"{file}: the text is not UTF-8: read as Windows-1252" in cycle.remarks
+    assert f"{file}: 1 line(s) above the header not read" in cycle.remarks
+    file.write_text(text, "utf-8")
+    assert not [line for line in load_cycle(file).remarks if "1252" in line]
+
+
+@pytest.mark.parametrize(("title", "level"), [("alt_gps_m", False), ("pressure_hpa", True)])
+def test_a_level_road_is_said_to_be_one(tmp_path, title, level):
+    file = tmp_path / "log.csv"
+    file.write_text(f"time_s,v_kmh,{title}\n" + rows(lambda k, v: f"{k},{3.6 * v},{500 + 2 * k}"))
+    said = f"{file}: a level road: no column of grade or elevation" in load_cycle(file).remarks
+    assert said is level

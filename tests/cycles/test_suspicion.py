@@ -134,4 +134,4 @@ def test_a_remark_reaches_the_result_and_its_figures(tmp_path):
     run = simulate(file, "rule-based", settings={"rule_based.balance": False})
     (remark,) = [line for line in run.summary()["remarks"] if "unusual" in line]
     assert remark.startswith(f"{file}: unusual for a car: ")
-    assert "are the speeds in m/s? to get m/s, divide km/h by 3.6" in remark
+    assert "is the unit of speed right? km/h read as m/s are 3.6 times too fast" in remark

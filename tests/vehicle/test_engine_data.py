@@ -262,10 +262,32 @@ def test_points_that_mean_nothing_are_left_out_and_counted(tmp_path):
     data = read_engine_data(file, LHV)
     assert data.power_w.tolist() == [5e3, 15e3, 40e3, 60e3]
     assert data.remarks == (
-        "1 of 7 points with an empty cell left out",
+        "1 of 7 points without a value left out",
         "1 of 7 points at which the engine is dragged left out",
         "1 of 7 points without power or bsfc left out",
     )
+
+
+def test_title_lines_of_several_cells_and_dashes(tmp_path):
+    """A header is as wide as the rows; titles above it are not, whatever separates their cells."""
+    file = tmp_path / "bench.csv"
+    header = "n_mot;Md;Pe;be"
+    points = "1000;10;1;400\n1000;80;8,4;250\n4000;30;12;320\n4000;60;25;----\n4000;90;37;260\n"
+    file.write_text(f"Bench 4;engine L3;\n2025-03-14;KM\n{header}\n1/min;Nm;kW;g/kWh\n{points}")
+    data = read_engine_data(file, LHV)
+    assert data.torque_nm.tolist() == [10, 80, 30, 90]
+    assert "2 line(s) above the header not read" in data.remarks
+    # a row that is too wide stays a row
+    file.write_text("rpm,torque_nm,g/s\n1000,10,0.2,7\n2000,10,0.3\n")
+    with pytest.raises(InputError, match="line 2: 4 values, but the header has 3 columns"):
+        read_engine_data(file, LHV)
+
+
+def test_the_columns_that_are_there_are_named(tmp_path):
+    file = tmp_path / "bench.csv"
+    file.write_text("drehzahl,moment,be\n1/min,Nm,g/kWh\n1000,10,400\n")
+    with pytest.raises(InputError, match="there are 'drehzahl', 'moment', 'be'; needed are speed"):
+        read_engine_data(file, LHV)
 
 
 def test_a_base_gives_way_to_the_other_description_of_an_engine(tmp_path):
