@@ -88,11 +88,23 @@ def sentence(vehicle: Vehicle, run: "Trajectory", excess: Excess) -> str:
          f"{coolant.t_cl_min_degc:g}..{coolant.t_cl_max_degc:g} °C"),
         (excess.power_w, f"power {excess.power_w.max():.3g} W beyond its limits"),
     ]  # fmt: skip
-    worst = ", ".join(text for values, text in parts if values.any())
+    worst = ", ".join(text for values, text in parts if values.any()) + _departs(vehicle, run)
     where = f"from {seconds[0]} s on, in {len(seconds)} of {len(run.fuel_g)} s,"
     if unavoidable:
         return f"{where} the trip is beyond the car, whatever the command of that second: {worst}"
     return f"{where} limits are exceeded: {worst}"
+
+
+def _departs(vehicle: Vehicle, run: "Trajectory") -> str:
+    """Say that the coolant is outside its limits before anything is commanded."""
+    thermal, at_degc = vehicle.thermal, float(run.t_cl_degc[0])
+    if thermal.t_cl_min_degc <= at_degc <= thermal.t_cl_max_degc:
+        return ""
+    if at_degc < thermal.t_cl_min_degc:
+        return (
+            f"; it departs at {at_degc:g} °C: a cold start asks for a lower thermal.t_cl_min_degc"
+        )
+    return f"; it departs at {at_degc:g} °C"
 
 
 def _is_safest(layer: SafetyLayer, run: "Trajectory", k: int) -> bool:

@@ -1,7 +1,7 @@
 """Results of a run: trajectories, the figures computed from them, JSON."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, Self
 
@@ -13,6 +13,7 @@ from qpmpc.controllers.monitor import Flag
 from qpmpc.engine_runs import run_figures
 from qpmpc.limits import Excess, excess_of, sentence
 from qpmpc.qp.expectation import Expectation
+from qpmpc.shown import shown
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.plant import PlantState, StepFlows
@@ -103,13 +104,17 @@ class Run:
     solver: str
     implementation: str
     remarks: tuple[str, ...]
-    vehicle: Vehicle
+    vehicle: Vehicle = field(repr=False)
     distance_km: float
-    trajectory: Trajectory
+    trajectory: Trajectory = field(repr=False)
     faults: dict[str, Any] | None = None
     plant: dict[str, Any] | None = None
     reservations: tuple[str, ...] = ()
     expects: Expectation | None = None
+
+    def __str__(self) -> str:
+        said = [f"{self.fuel_soc_balanced_g:.1f} g of fuel, SOC-balanced", *self.remarks]
+        return f"{shown(self.controller)} on {shown(self.cycle)}: {'; '.join(map(shown, said))}"
 
     @property
     def fuel_g(self) -> float:

@@ -79,3 +79,18 @@ def test_an_engine_may_idle_while_the_brakes_hold_a_full_battery() -> None:
     assert row["violations"] == {"soc": 0.0, "t_cl_degc": 0.0, "power_w": 0.0}
     idles = run.trajectory.engine_on & (run.trajectory.p_friction_w > 0.0)
     assert idles.sum() > 100
+
+
+def test_a_start_below_the_least_coolant_temperature_says_how_to_ask_for_one() -> None:
+    cold = {"trip.t_cl_init_degc": 22.0}
+    run = simulate(constant(15.0, 0.0), "rule-based", settings=cold)
+    (line,) = [line for line in run.not_comparable if "coolant" in line]
+    assert "departs at 22 °C: a cold start asks for a lower thermal.t_cl_min_degc" in line
+    lower = cold | {"thermal.t_cl_min_degc": 15.0}
+    assert simulate(constant(15.0, 0.0), "rule-based", settings=lower).comparable
+
+
+def test_a_run_is_printed_in_a_line() -> None:
+    run = simulate(constant(15.0, 0.0), "rule-based")
+    assert str(run).startswith(f"rule-based on climb: {run.fuel_soc_balanced_g:.1f} g of fuel")
+    assert len(repr(run)) < 1000  # no trajectory in it

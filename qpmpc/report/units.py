@@ -6,6 +6,7 @@ _UNITS = {
     "w_per_k_per_mps": "W/(K m/s)",
     "w_per_k": "W/K",
     "w_per_s": "W/s",
+    "g_per_s": "g/s",
     "j_per_kg": "J/kg",
     "j_per_k": "J/K",
     "kg_per_l": "kg/L",

@@ -215,7 +215,8 @@ class Vehicle(Section):
         for name, soc in (("soc_init", self.trip.soc_init), ("soc_end", self.trip.soc_target)):
             if not self.battery.soc_min <= soc <= self.battery.soc_max:
                 raise ValueError(
-                    f"trip.{name} must lie between battery.soc_min and battery.soc_max"
+                    f"trip.{name} must lie between battery.soc_min and battery.soc_max, "
+                    f"{self.battery.soc_min:g}..{self.battery.soc_max:g} (given: {soc:g})"
                 )
         most_j = CRANKING_SHARE * self.battery.power_discharge_max_w * STEP_S
         if self.engine.start_energy_j > most_j:

@@ -1,5 +1,9 @@
+import numpy as np
+
+from qpmpc.report.parameter_rows import parameter_rows
 from qpmpc.report.units import unit_of
 from qpmpc.vehicle import load_vehicle
+from qpmpc.vehicle.engine_parameters import MAP
 
 DIMENSIONLESS = {
     "rotating_mass_factor", "eta_drive", "eta_regen", "indicated_efficiency", "k", "exponent",
@@ -19,3 +23,21 @@ def test_longest_ending_counts():
     assert unit_of("heat_capacity_j_per_k") == "J/K"
     assert unit_of("span_k") == "K"
     assert unit_of("ramp_w_per_s") == "W/s"
+    assert unit_of("line_fuel_g_per_s") == "g/s"
+
+
+def test_an_engine_of_two_hundred_points_is_a_row_among_others():
+    """As wide as the widest other: its first values, its last and how many there are."""
+    points = 200
+    line = {
+        "engine.line_power_w": np.linspace(0.0, 71e3, points).tolist(),
+        "engine.line_fuel_g_per_s": np.linspace(0.1, 5.0, points).tolist(),
+    } | dict.fromkeys(f"engine.{key}" for key in MAP)
+    shown = {
+        name: text for rows in parameter_rows(load_vehicle().with_settings(line))
+        for name, text, _ in rows
+    }  # fmt: skip
+    assert shown["engine.line_power_w"].startswith("0 ")
+    assert shown["engine.line_power_w"].endswith(f" ... 71000 ({points} values)")
+    assert max(map(len, shown.values())) < 100
+    assert shown["trip.soc_end_at_least"] == "false"

@@ -159,8 +159,8 @@ def test_values_that_do_not_fit_together_are_named_with_their_files(write):
     )
     path.write_text('base = "prius-nimh"\nname = "x"\n[trip]\nsoc_init = 0.9\n')
     assert refusal(path) == (
-        f"{path}: trip.soc_init must lie between battery.soc_min and battery.soc_max "
-        "(battery.soc_min in prius-nimh, battery.soc_max in prius-nimh)"
+        f"{path}: trip.soc_init must lie between battery.soc_min and battery.soc_max, "
+        "0.4..0.8 (given: 0.9) (battery.soc_min in prius-nimh, battery.soc_max in prius-nimh)"
     )
 
 
