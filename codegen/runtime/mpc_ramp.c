@@ -17,10 +17,11 @@ mpc_real mpc_ramp_least_w(const mpc_state *state)
     for (int32_t k = 1; k < MPC_SHORT; k++) {
         const mpc_stage_road *const road = &state->stage[k].road;
         const mpc_real seconds = (mpc_real)k + REAL(1.0);
-        const mpc_real risen_w = mpc_par.ramp_w_per_s * (mpc_real)k;
+        const mpc_real risen_w = (mpc_par.ramp_w_per_s - POWER_MARGIN_W) * (mpc_real)k;
         total_w += road->net_w;
         const mpc_real gives_w = mpc_map_power_to_reach_w(soc, soc - (to_spare / seconds));
-        const mpc_real at_once_w = (road->net_w - mpc_par.battery_discharge_max_w) - risen_w;
+        const mpc_real gives_most_w = mpc_par.battery_discharge_max_w - POWER_MARGIN_W;
+        const mpc_real at_once_w = (road->net_w - gives_most_w) - risen_w;
         const mpc_real in_all_w = ((total_w / seconds) - gives_w) - (REAL(0.5) * risen_w);
         const mpc_real needed_w = real_max(at_once_w, in_all_w);
         least_w = (road->duration_s > REAL(0.0)) ? real_max(least_w, needed_w) : least_w;

@@ -9,6 +9,7 @@ The same in C: codegen/runtime/mpc_ramp.c.
 import numpy as np
 from numpy.typing import NDArray
 
+from qpmpc.controllers.safety import POWER_MARGIN_W
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.parameters import Vehicle
 
@@ -26,7 +27,8 @@ class RampFloor:
         mean(P0_0, ..., P0_k) - P_reach(soc, soc_min, k + 1) - r k / 2
 
     for k = 1, 2, ..., with P_reach the battery power that leads to the limit in k + 1 seconds. An
-    engine that is off has P = 0. The coming second itself is the safety layer's.
+    engine that is off has P = 0. The coming second itself is the safety layer's, and so is each of
+    the next: r and P_discharge are smaller by the margin that it keeps from them.
 
     Parameters
     ----------
@@ -52,9 +54,9 @@ class RampFloor:
         total_w, least_w = sum(seconds_w[:1]), 0.0
         for k, second_w in enumerate(seconds_w[1:], start=1):
             total_w += second_w
-            risen_w = engine.ramp_w_per_s * k
+            risen_w = (engine.ramp_w_per_s - POWER_MARGIN_W) * k
             gives_w = self._maps.power_to_reach_w(soc, soc - to_spare, k + 1.0)
-            at_once_w = second_w - battery.power_discharge_max_w - risen_w
+            at_once_w = second_w - (battery.power_discharge_max_w - POWER_MARGIN_W) - risen_w
             in_all_w = total_w / (k + 1.0) - gives_w - 0.5 * risen_w
             least_w = max(least_w, at_once_w, in_all_w)
         return min(least_w, engine.power_max_w)

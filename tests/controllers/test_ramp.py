@@ -6,6 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qpmpc.controllers.ramp import SOC_KEPT, RampFloor
+from qpmpc.controllers.safety import POWER_MARGIN_W
+from qpmpc.cycles import Cycle
 from qpmpc.simulation import simulate
 from qpmpc.vehicle import load_vehicle
 from qpmpc.vehicle.battery import BatteryMaps
@@ -36,11 +38,14 @@ def test_with_the_least_power_the_battery_can_give_the_rest(car, net_w, soc):
 @pytest.mark.parametrize("car", CARS, ids=lambda car: car.name)
 @given(net_w=NETS, soc=SOCS)
 def test_it_is_the_least(car, net_w, soc):
-    """With 1 W less the battery would give more than its limit, or than it holds."""
+    """With some W less the battery would give more than its limit, or than it holds.
+
+    They are the safety layer's margin, once for the limit and once for each second of the ramp.
+    """
     least_w = RampFloor(car).least_w(net_w, soc)
     if least_w == 0.0:
         return
-    rest_w = battery_power_w(car, net_w, least_w - 1.0)
+    rest_w = battery_power_w(car, net_w, least_w - POWER_MARGIN_W * len(net_w) - 0.1)
     maps, spare = BatteryMaps(car.battery), max(soc - car.battery.soc_min - SOC_KEPT, 0.0)
     held_w = [maps.power_to_reach_w(soc, soc - spare, k + 1.0) for k in range(len(net_w))]
     mean_w = np.cumsum(rest_w) / np.arange(1, len(net_w) + 1)
@@ -62,3 +67,18 @@ def test_soc_is_kept_where_the_engine_cannot_follow_the_demand(cycle, soc, imple
     settings = {"trip.soc_init": soc, "mh_qp.implementation": implementation}
     run = simulate(cycle, "mh-qp", "prius-liion", settings=settings)
     assert run.summary()["violations"]["soc"] == 0.0
+
+
+@pytest.mark.parametrize("implementation", ["c", "python"])
+def test_a_jump_of_the_demand_is_met_to_the_last_watt(implementation):
+    """Two seconds of ramp before a slip road: each keeps a margin, which was missing at the end."""
+    speed_mps = np.concatenate(
+        [np.linspace(0.0, 22.6, 40), np.full(30, 22.6), 22.6 + np.arange(8) * 1.3]
+    )
+    zero = np.zeros(len(speed_mps))
+    cycle = Cycle("slip road", np.arange(len(speed_mps)) * 1.0, speed_mps, zero)
+    settings = {"engine.ramp_w_per_s": 9.6e3, "mh_qp.implementation": implementation}
+    run = simulate(cycle, "mh-qp", settings=settings)
+    jump_w = np.diff(run.trajectory.demand_w).max()
+    assert jump_w > 27e3 + 9.6e3  # more than battery and one second of the ramp
+    assert run.excess.power_w.max() == 0.0
