@@ -14,9 +14,6 @@
 #include "mpc_real.h"
 
 #define NO_VALUE REAL(1.0e20)
-#if MPC_LEARNING
-#define NO_FUEL_G REAL(-1.0)
-#endif
 
 static int32_t is_count(int32_t x, int32_t most) { return ((x >= 0) && (x <= most)) ? 1 : 0; }
 
@@ -53,7 +50,7 @@ int32_t mpc_check_state(const mpc_state *state)
     fine &= within(watch->good.p_eng_before_w, REAL(0.0), mpc_par.engine_max_w);
     fine &= is_count(watch->good.engine_for_s, LONG_AGO_S);
 #if MPC_LEARNING
-    fine &= within(watch->good.fuel_g, NO_FUEL_G, mpc_par.learned_most_g);
+    fine &= within(watch->good.fuel_g, REAL(-1.0), mpc_par.learned_most_g);
     fine &= mpc_learned_check(state);
 #endif
     return fine & is_count(watch->good.engine_on, 1);
@@ -186,7 +183,7 @@ int32_t mpc_check_measured(mpc_watch *watch, const mpc_in *in, int32_t *elapsed)
     if (within(in->fuel_g, REAL(0.0), mpc_par.learned_most_g) != 0) {
         good->fuel_g = in->fuel_g;
     } else {
-        good->fuel_g = NO_FUEL_G;
+        good->fuel_g = REAL(-1.0); /* not known */
         fine = 0;
     }
 #endif
