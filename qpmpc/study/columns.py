@@ -59,6 +59,9 @@ FIGURES: dict[str, type] = {
     "friction_brake_j": float,
     "fuel_expected_g": float,
     "fuel_off_expected_percent": float,
+    "soc_end_target": float,
+    "soc_end_at_least": bool,
+    "battery_used_kwh": float,
     "faults_effect": str,
 }
 PROVENANCE: dict[str, type] = {
