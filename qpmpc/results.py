@@ -130,9 +130,9 @@ class Run:
         return self._correction_g(float(self.trajectory.soc[-1]))
 
     def _correction_g(self, soc_end: float) -> float:
-        trip = self.vehicle.trip
-        missing = trip.soc_target - soc_end
-        return self._worth_g(max(missing, 0.0) if trip.soc_end_at_least else missing)
+        missing = self.soc_target - soc_end
+        at_least = self.vehicle.trip.soc_end_at_least
+        return self._worth_g(max(missing, 0.0) if at_least else missing)
 
     def _worth_g(self, soc: float) -> float:
         trip, engine = self.vehicle.trip, self.vehicle.engine
@@ -140,10 +140,15 @@ class Run:
         return soc * energy_j / (trip.eta_eq * engine.lhv_j_per_kg * 1e-3)
 
     @property
+    def soc_target(self) -> float:
+        """SOC to arrive with; without `trip.soc_end` that of departure, wherever that is."""
+        asked = self.vehicle.trip.soc_end
+        return float(self.trajectory.soc[0]) if asked is None else asked
+
+    @property
     def depletion_g(self) -> float:
         """Fuel worth of what the battery was to give, (SOC_init - SOC_target) E_bat likewise."""
-        trip = self.vehicle.trip
-        return max(self._worth_g(trip.soc_init - trip.soc_target), 0.0)
+        return max(self._worth_g(float(self.trajectory.soc[0]) - self.soc_target), 0.0)
 
     @property
     def battery_used_j(self) -> float:
@@ -271,7 +276,7 @@ class Run:
             "friction_brake_j": float(tr.p_friction_w.sum()) * STEP_S,
             "fuel_expected_g": self.fuel_expected_g,
             "fuel_off_expected_percent": self.fuel_off_expected_percent,
-            "soc_end_target": self.vehicle.trip.soc_target,
+            "soc_end_target": self.soc_target,
             "soc_end_at_least": self.vehicle.trip.soc_end_at_least,
             "battery_used_kwh": self.battery_used_j / J_PER_KWH,
             **({} if self.faults is None else {"faults": self.faults}),
