@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Any
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.rows import Rows, Table, Var, table_of
 from qpmpc.qp.scaling import Scaling, ScalingSettings
-from qpmpc.qp.stage_qp import QpData, QpSettings, StageQp
+from qpmpc.qp.settings import QpSettings
+from qpmpc.qp.stage_qp import QpData, StageQp
 from qpmpc.qp.structure import QpStructure
 
 if TYPE_CHECKING:

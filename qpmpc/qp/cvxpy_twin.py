@@ -17,7 +17,8 @@ from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.quantities import Quantities
 from qpmpc.qp.rows import Entry, Row, Var, table_of
 from qpmpc.qp.scaling import Scaling, ScalingSettings
-from qpmpc.qp.stage_qp import QpSettings, qp_parameters
+from qpmpc.qp.settings import QpSettings
+from qpmpc.qp.stage_qp import qp_parameters
 from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]

@@ -12,7 +12,8 @@ from qpmpc.cycles import Cycle
 from qpmpc.pwa import PwaModel
 from qpmpc.qp.coolant_floor import CoolantFloor
 from qpmpc.qp.scaling import ScalingSettings
-from qpmpc.qp.stage_qp import QpSettings, qp_parameters
+from qpmpc.qp.settings import QpSettings
+from qpmpc.qp.stage_qp import qp_parameters
 from qpmpc.trip import Trip
 from qpmpc.vehicle import load_vehicle
 from qpmpc.verification.independent.equations import Equations

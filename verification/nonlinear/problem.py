@@ -11,7 +11,8 @@ from qpmpc.preview.stages import Stages
 from qpmpc.qp.coolant_floor import CoolantFloor
 from qpmpc.qp.heat_reserve import heat_reserve_k
 from qpmpc.qp.rows import COOL_SHARE, SHORTEST_SCALE_S, SIGMA_FORCED, Var, table_of
-from qpmpc.qp.stage_qp import T_CL_MAX_MARGIN_K, QpSettings
+from qpmpc.qp.settings import QpSettings
+from qpmpc.qp.stage_qp import T_CL_MAX_MARGIN_K
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.heat import air_w
 from qpmpc.vehicle.parameters import Vehicle
