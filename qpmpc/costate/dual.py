@@ -1,0 +1,256 @@
+"""The smoothed dual of the stage program: its value, slopes and curvature at given multipliers."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpmpc.costate.curves import Curves
+from qpmpc.costate.funnel import funnel
+from qpmpc.costate.program import Program
+from qpmpc.costate.stage import Least, least
+
+Floats = NDArray[np.float64]
+
+# Cost of off less that of on over which the on-share goes from 0 to 1, of a second and of a longer
+# stage. Where starts are free the engine runs in the seconds of a class that ask for most; where
+# they cost, through it.
+SWITCH_G_PER_S, LONG_SWITCH_G_PER_S = 0.03, 0.05
+START_SWITCH_G_PER_S, START_LONG_SWITCH_G_PER_S = 0.01, 0.015
+LEAST_SWITCH_G = 1e-9  # of a masked stage
+NO_CHOICE_G = 1e3  # as good as any cost, where the engine must run or must not
+
+
+@dataclass(frozen=True)
+class Multipliers:
+    """Prices of the limits; the costates follow from them.
+
+    Attributes
+    ----------
+    charge : lambda, g per unit of SOC at the end of each stage, >= 0; it falls over a lower limit
+        that binds and rises over an upper one, by the limit's multiplier
+    heat : multipliers of the coolant limits, g/K: of the lower one above 0, of the upper below
+    """
+
+    charge: Floats
+    heat: Floats
+
+    def towards(self, other: "Multipliers", share: float) -> "Multipliers":
+        """Return the point that far on the way to another; signs stay right, being convex."""
+        return Multipliers(
+            self.charge + share * (other.charge - self.charge),
+            self.heat + share * (other.heat - self.heat),
+        )
+
+
+def with_signs(at: Multipliers, slack_g_per_k: float) -> Multipliers:
+    """Return multipliers of the right sign from any: lambda >= 0, heat within the slack's price."""
+    return Multipliers(np.maximum(at.charge, 0.0), np.clip(at.heat, -slack_g_per_k, slack_g_per_k))
+
+
+def coolant_costate(program: Program, heat: Floats) -> Floats:
+    """Return nu, the price of the coolant row, g/K, shape (n,).
+
+    Backwards, nu_k = -(price_t_k + t_before_k+1 nu_k+1 - heat_k) / t_end_k.
+
+    It has to come from here: any other leaves T_k, which has no bound, a price.
+    """
+    price, after = [], 0.0
+    drive = (heat - program.price_t).tolist()
+    t_end = program.t_end.tolist()
+    before = [*program.t_before[1:].tolist(), 0.0]
+    for k in range(len(drive) - 1, -1, -1):
+        after = (drive[k] - before[k] * after) / t_end[k]
+        price.append(after)
+    return np.array(price[::-1])
+
+
+@dataclass(frozen=True)
+class StageCosts:
+    """Every stage minimised at costates lambda and nu.
+
+    Attributes
+    ----------
+    nu : costate of the coolant
+    on : the stage with its engine on
+    on_cost, off_cost : of the whole stage, g; infinite where it may not or must be on
+    start_cost : of one start, g
+    """
+
+    nu: Floats
+    on: Least
+    on_cost: Floats
+    off_cost: Floats
+    start_cost: Floats
+
+    def with_first(self, count: int, exact: "StageCosts") -> "StageCosts":
+        """Return the same with the first stages of another."""
+
+        def joined(one: Floats, other: Floats) -> Floats:
+            return np.concatenate([one[:count], other[count:]])
+
+        return StageCosts(
+            self.nu,
+            Least(*map(joined, exact.on, self.on)),
+            joined(exact.on_cost, self.on_cost),
+            self.off_cost,
+            self.start_cost,
+        )
+
+    @classmethod
+    def of(cls, program: Program, at: Multipliers, curves: Curves) -> "StageCosts":
+        """Evaluate all stages on these curves."""
+        p = program
+        nu = coolant_costate(p, at.heat)
+        price_internal = at.charge * p.charge_per_w
+        on = least(
+            curves,
+            p.net_w,
+            p.low_w,
+            p.high_w,
+            p.fuel_cost - nu * p.per_fuel,
+            nu * p.per_power,
+            price_internal,
+        )
+        start = p.start_fuel_g + at.charge * p.cranking_soc - nu * p.start_k
+        off = price_internal * p.off_w
+        return cls(nu, on, np.where(p.can, on.cost, np.inf), np.where(p.must, np.inf, off), start)
+
+
+@dataclass(frozen=True)
+class Dual:
+    """The smoothed dual at some multipliers; see `dual`.
+
+    Attributes
+    ----------
+    at : the multipliers
+    value : a lower bound on the program, g; but where a start's heat is worth more than the start,
+        as beyond a coolant limit, starts count as free, and it is a measure for the search alone
+    costs : of the stages
+    share : sigma
+    starts : u
+    soc, t_cl_degc : what the stages lead to
+    change, heat : of SOC and of the coolant row by each stage, starts included
+    charge_curvature, cross_curvature, heat_curvature : derivatives of `change` with respect to
+        lambda, of `change` to nu, of `heat` to nu
+    switch_charge, switch_heat : `change` and `heat` of on less those of off
+    width : W
+    """
+
+    at: Multipliers
+    value: float
+    costs: StageCosts
+    share: Floats
+    starts: Floats
+    soc: Floats
+    t_cl_degc: Floats
+    charge_curvature: Floats
+    cross_curvature: Floats
+    heat_curvature: Floats
+    switch_charge: Floats
+    switch_heat: Floats
+    width: Floats
+
+
+def constant_part(program: Program, at: Multipliers, nu: Floats) -> float:
+    """Terms of the rows and limits in the Lagrangian that no variable of a stage is in, g."""
+    p = program
+    jump = at.charge - np.append(at.charge[1:], 0.0)
+    limits = np.where(jump > 0.0, jump * p.soc_low, jump * p.soc_high).sum()
+    heat = np.where(at.heat > 0.0, at.heat * p.t_low, at.heat * p.t_high).sum()
+    rows = float(nu[0] * p.t_before[0] * p.t_cl_degc - (nu * p.settled).sum())
+    return float(limits + heat) + rows - float(at.charge[0]) * p.soc
+
+
+def dual(program: Program, at: Multipliers) -> Dual:
+    """Evaluate the smoothed dual.
+
+    In each stage sigma J_on + (1 - sigma) J_off + W / 2 (sigma^2 - sigma) is minimised over sigma
+    in [0, 1], with W the cost over which the switch is smoothed: no more than the stage's own
+    least, and at most W / 8 below it. Starts couple the stages of a chain by prices e_k of
+    sigma_k - sigma_k-1 between 0 and rises_k times the cost of a start; that is a funnel too.
+    """
+    p, costs = program, StageCosts.of(program, at, program.shared)
+    second, longer = SWITCH_G_PER_S, LONG_SWITCH_G_PER_S
+    if p.has_start:
+        second, longer = START_SWITCH_G_PER_S, START_LONG_SWITCH_G_PER_S
+    width = np.where(p.duration_s > 1.0, longer, second) * p.duration_s
+    width = np.maximum(width, LEAST_SWITCH_G)
+    free = p.can & ~p.must
+    difference = np.where(free, costs.on_cost, 0.0) - np.where(free, costs.off_cost, 0.0)
+    difference = np.where(free, difference, np.where(p.must, -NO_CHOICE_G, NO_CHOICE_G))
+    rest, starts_g, starts = 0.0, np.zeros_like(width), np.zeros_like(width)
+    if p.has_start:
+        start_price = np.maximum(costs.start_cost, 0.0) * p.rises
+        low, high = np.minimum(start_price, 0.0), np.maximum(start_price, 0.0)
+        edge = _start_prices(width, difference, low, high, p.starts_on)
+        starts_g = edge - np.append(edge[1:], 0.0)
+        rest = -float(edge[0]) * p.starts_on
+    share = np.clip(0.5 - (difference + starts_g) / width, 0.0, 1.0)
+    share = np.where(free, share, np.where(p.must, 1.0, 0.0))
+    if p.has_start:
+        rise = np.diff(share, prepend=float(p.starts_on))
+        starts = np.maximum(p.rises * rise, 0.0)
+    on_part = np.where(share > 0.0, share * np.where(p.can, costs.on_cost, 0.0), 0.0)
+    off_part = np.where(share < 1.0, (1.0 - share) * np.where(p.must, 0.0, costs.off_cost), 0.0)
+    stages_g = on_part + off_part + share * starts_g + 0.5 * width * (share**2 - share)
+    value = float(stages_g.sum()) + rest + constant_part(p, at, costs.nu)
+    on = costs.on
+    v_charge = p.charge_per_w * on.ratio
+    v_heat = p.per_fuel * on.slope_g_per_j - p.per_power
+    gives = share * on.gives
+    switch_charge = p.charge_per_w * (p.off_w - on.internal_w)
+    switch_heat = p.per_fuel * on.fuel_g_per_s - p.per_power * on.power_w
+    turns = np.where(free & (share > 0.0) & (share < 1.0), 1.0 / width, 0.0)
+    soc, t_cl = _states(p, share, starts, switch_charge, switch_heat)
+    return Dual(
+        at,
+        value,
+        costs,
+        share,
+        starts,
+        soc,
+        t_cl,
+        gives * v_charge**2 + turns * switch_charge**2,
+        gives * v_charge * v_heat + turns * switch_charge * switch_heat,
+        gives * v_heat**2 + turns * switch_heat**2,
+        switch_charge,
+        switch_heat,
+        width,
+    )
+
+
+def _start_prices(
+    width: Floats, difference: Floats, low: Floats, high: Floats, on_now: bool
+) -> Floats:
+    """Prices e_k of sigma_k - sigma_k-1, shape (n,).
+
+    With sigma_k = 1/2 - (J_on - J_off + e_k - e_k+1) / W_k the sum of W sigma up to stage k is
+    known but for e_k+1, which lies between its limits: a funnel with W as response.
+    """
+    first = 0.0 if on_now else float(high[0])
+    known = np.cumsum(0.5 * width - difference) - first
+    after_low, after_high = np.append(low[1:], 0.0), np.append(high[1:], 0.0)
+    share = funnel(np.zeros_like(width), width, known + after_low, known + after_high, 0.0)
+    edge = np.cumsum(width * share) - known
+    return np.append(first, np.clip(edge[:-1], after_low[:-1], after_high[:-1]))
+
+
+def _states(
+    program: Program, share: Floats, starts: Floats, switch_charge: Floats, switch_heat: Floats
+) -> tuple[Floats, Floats]:
+    p = program
+    change = share * switch_charge - p.charge_per_w * p.off_w - p.cranking_soc * starts
+    heat = share * switch_heat + p.start_k * starts
+    return p.soc + np.cumsum(change), coolant(p, heat)
+
+
+def coolant(program: Program, heat: Floats) -> Floats:
+    """Return T at the end of each stage of a plan with these heats, shape (n,)."""
+    p = program
+    t_cl, found = p.t_cl_degc, []
+    rows = zip((p.settled + heat).tolist(), p.t_before.tolist(), p.t_end.tolist(), strict=True)
+    for right, before, end in rows:
+        t_cl = (right - before * t_cl) / end
+        found.append(t_cl)
+    return np.array(found)

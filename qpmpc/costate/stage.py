@@ -1,0 +1,87 @@
+"""The least of one stage at given prices, in closed form, and how it responds to them."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpmpc.costate.curves import Curves
+
+Floats = NDArray[np.float64]
+
+LEAST_RATIO = 1e-3  # of prices: below it charging is for nothing
+LEAST_PRICE = 1e-30  # of the battery's store, g/W: of a masked stage
+
+
+class Least(NamedTuple):
+    """Least-cost engine power of each stage with the engine on, shape (n,) each.
+
+    Attributes
+    ----------
+    power_w : E
+    fuel_g_per_s, internal_w : f(E), l(P0 - E)
+    cost : w_F f + w_E E + w_G l, in the unit of the prices
+    slope_g_per_j : of the piece of f that E lies on
+    ratio : r, slope of l there where E is inside a piece and its limits
+    gives : dE of a unit of marginal cost, W^2 per unit of cost; 0 at a kink or a limit
+    """
+
+    power_w: Floats
+    fuel_g_per_s: Floats
+    internal_w: Floats
+    cost: Floats
+    slope_g_per_j: Floats
+    ratio: Floats
+    gives: Floats
+
+
+def least(
+    curves: Curves,
+    net_w: Floats,
+    low_w: Floats,
+    high_w: Floats,
+    price_fuel: Floats,
+    price_power: Floats,
+    price_internal: Floats,
+) -> Least:
+    """Minimise  w_F f(E) + w_E E + w_G l(P0 - E)  over low <= E <= high, exactly.
+
+    On piece i of f the slope of l has to be r_i = (w_F a_i + w_E) / w_G, at the battery power
+
+        P_i = U^2 (1 - 1 / r_i^2) / (4 R),  R of discharge for r_i > 1, else of charge
+
+    so that E_i = P0 - P_i, clipped to the piece and the limits; the least of all pieces is the
+    least of the stage, whatever the shape of f, because l is convex.
+
+    Parameters
+    ----------
+    curves : f and l
+    net_w : P0, shape (n,)
+    low_w, high_w : limits of E, low <= high, shape (n,)
+    price_fuel, price_power, price_internal : w_F, w_E, w_G >= 0, shape (n,)
+    """
+    w_internal = np.maximum(price_internal, LEAST_PRICE)[:, None]
+    marginal = price_fuel[:, None] * curves.slope + price_power[:, None]
+    ratio = np.maximum(marginal / w_internal, LEAST_RATIO)
+    ohm = np.where(ratio > 1.0, curves.discharge_ohm, curves.charge_ohm)
+    free = net_w[:, None] - curves.square_v2 * (1.0 - 1.0 / ratio**2) / (4.0 * ohm)
+    begin = np.maximum(curves.begin_w, low_w[:, None])
+    end = np.minimum(curves.end_w, high_w[:, None])
+    power = np.minimum(np.maximum(free, begin), end)
+    internal = curves.internal_w(net_w[:, None] - power)
+    cost = marginal * power + price_fuel[:, None] * curves.intercept
+    cost += price_internal[:, None] * internal
+    cost = np.where(begin <= end, cost, np.inf)
+    best = (np.arange(len(net_w)), cost.argmin(axis=1))
+    inside = (free > begin) & (free < end)
+    gives = np.where(inside, curves.square_v2 / (2.0 * ohm * ratio**3 * w_internal), 0.0)
+    slope = curves.slope[best[1]]
+    return Least(
+        power[best],
+        slope * power[best] + curves.intercept[best[1]],
+        internal[best],
+        cost[best],
+        slope,
+        ratio[best],
+        gives[best],
+    )

@@ -1,0 +1,71 @@
+"""The smoothed dual: its slope is the excess of the limits, it is concave, Newton finds its top."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from small_program import program
+
+from qpmpc.costate.dual import Multipliers, dual
+from qpmpc.costate.solve import newton
+
+MOST = 3e3
+CARS = st.sampled_from(["prius-nimh", "prius-liion", "paper-nimh", "paper-liion"])
+STATES = (CARS, st.integers(0, 58), st.floats(0.58, 0.62), st.floats(45.0, 88.0), st.booleans())
+
+
+def multipliers(p, seed):
+    rng = np.random.default_rng(seed)
+    n = len(p.duration_s)
+    charge = rng.uniform(60.0, 300.0) * rng.uniform(0.8, 1.2, n)
+    heat = rng.normal(0.0, 0.5, n)
+    return Multipliers(charge, heat)
+
+
+@settings(deadline=None, max_examples=60)
+@given(*STATES, st.integers(0, 1000))
+def test_its_slope_is_what_the_stages_leave_of_the_limits(car, step, soc, t_cl, on, seed):
+    p, _ = program(car, step, soc, t_cl, on)
+    one, other = multipliers(p, seed), multipliers(p, seed + 1)
+    here = dual(p, one)
+    # of the jumps of lambda and of the coolant's multipliers
+    jump = np.diff(other.charge - one.charge, append=0.0) * -1.0
+    jump[-1] = (other.charge - one.charge)[-1]
+    sign = one.charge - np.append(one.charge[1:], 0.0)
+    limit = np.where(sign > 0.0, p.soc_low, p.soc_high)
+    t_limit = np.where(one.heat > 0.0, p.t_low, p.t_high)
+    slope = (jump * (limit - here.soc)).sum()
+    slope += ((other.heat - one.heat) * (t_limit - here.t_cl_degc)).sum()
+    step_size = 1e-6
+    ahead = dual(p, one.towards(other, step_size))
+    kept = np.sign(ahead.at.heat) == np.sign(one.heat)
+    assert kept.all()
+    size = np.abs(jump * p.soc_high).sum() + np.abs((other.heat - one.heat) * p.t_high).sum()
+    # second order over the step; the start prices' floor at 0 and kinks of f add little
+    assert (ahead.value - here.value) / step_size == pytest.approx(slope, abs=2e-3 * size + 1e-3)
+
+
+@settings(deadline=None, max_examples=60)
+@given(*STATES, st.integers(0, 1000))
+def test_it_is_concave(car, step, soc, t_cl, on, seed):
+    p, _ = program(car, step, soc, t_cl, on)
+    one, other = multipliers(p, seed), multipliers(p, seed + 1)
+    ends = dual(p, one).value, dual(p, other).value
+    middle = dual(p, one.towards(other, 0.5)).value
+    assert middle >= 0.5 * sum(ends) - 1e-6 * (1.0 + max(map(abs, ends)))
+
+
+@settings(deadline=None, max_examples=30)
+@given(CARS, st.integers(0, 58), st.floats(0.58, 0.62), st.floats(51.0, 88.0), st.booleans())
+def test_newton_finds_its_top(car, step, soc, t_cl, on):
+    """From two sides, to the same value, which never falls on the way; the limits can be kept."""
+    p, _ = program(car, step, soc, t_cl, on)
+    n = len(p.duration_s)
+    tops = []
+    for guess in (60.0, 300.0):
+        values = []
+        start = Multipliers(np.full(n, guess), np.zeros(n))
+        top = newton(p, start, 60, MOST, lambda here, to=values: to.append(here.value))
+        assert (np.diff([*values, top.value]) >= 0.0).all()
+        tops.append(top.value)
+    assert tops[0] == pytest.approx(tops[1], abs=0.02)
