@@ -232,6 +232,8 @@ def values_of(
 
 def _refuse_unknown(settings: MhQpSettings, section: str) -> None:
     """Refuse the settings that generated code does not have."""
+    if settings.certificate:
+        raise InputError(f"generated C has no certificate: no {section}.certificate=true")
     if settings.solver is not None:
         raise InputError(
             f"generated C has its own algorithm, not {section}.solver={settings.solver}"

@@ -36,6 +36,10 @@ _CONTROLLERS = {
 }
 _PLANNERS = {
     "baseline-mpc": Shipped("qpmpc.controllers.baseline_mpc:baseline_mpc"),
+    "mh-costate": Shipped(
+        "qpmpc.controllers.mh_costate:MhCostate",
+        settings="qpmpc.controllers.mh_costate:MhCostateSettings",
+    ),
     "mh-nlp": Shipped("qpmpc.verification.nonlinear.mh_nlp:MhNlp", "casadi", "verification"),
 }
 CONTROLLERS = Names("controller", _CONTROLLERS, beside=_PLANNERS)
@@ -286,6 +290,7 @@ _READS = {
     "mh-qp": ("mh_qp", "rule_based", "forecast"),
     "mh-qp-paper": ("mh_qp_paper", "rule_based", "forecast"),
     "baseline-mpc": ("baseline_mpc", "rule_based", "forecast"),
+    "mh-costate": ("mh_costate", "rule_based", "forecast"),
     "mh-nlp": ("mh_qp.horizon", "mh_qp.qp", "rule_based", "forecast"),
     "rule-based": ("rule_based",),
     "ecms": ("ecms", "rule_based"),

@@ -35,7 +35,8 @@ class Trajectory:
     Attributes
     ----------
     soc, t_cl_degc : shape (steps + 1,)
-    all others : shape (steps,); `fallback` is the rung used, empty if none; `flags` as of `Flag`
+    all others : shape (steps,); `fallback` is the rung used, empty if none; `flags` as of `Flag`;
+        the rest as of `Decision`, nan where there is none
     """
 
     soc: Floats
@@ -55,6 +56,7 @@ class Trajectory:
     relaxation_gap: Floats
     on_share: Floats
     flags: NDArray[np.int64]
+    certificate_g: Floats
     fallback: list[str]
 
     @classmethod
@@ -80,6 +82,7 @@ class Trajectory:
         self.iterations[t] = decision.iterations
         self.relaxation_gap[t], self.on_share[t] = decision.relaxation_gap, decision.on_share
         self.flags[t], self.fallback[t] = decision.flags, decision.fallback
+        self.certificate_g[t] = decision.certificate_g
 
 
 @dataclass
@@ -227,7 +230,6 @@ class Run:
         """
         tr, excess, reasons = self.trajectory, self.excess, self.not_comparable
         step_ms = tr.step_time_s[np.isfinite(tr.step_time_s)] * 1e3
-        gap = tr.relaxation_gap[np.isfinite(tr.relaxation_gap)]
         share = tr.on_share[np.isfinite(tr.on_share)]
         integral = (share < INTEGRAL) | (share > 1.0 - INTEGRAL)
         return {
@@ -253,7 +255,7 @@ class Run:
                 "power_w": float(excess.power_w.max()),
             },
             "fallback_steps": sum(1 for rung in tr.fallback if rung),
-            "relaxation_gap": {"max": _max(gap), "mean": float(gap.mean()) if len(gap) else None},
+            "relaxation_gap": _max_and_mean(tr.relaxation_gap),
             "sigma_integral_share": float(integral.mean()) if len(share) else None,
             "step_time_ms": {
                 "median": float(np.median(step_ms)) if len(step_ms) else None,
@@ -279,6 +281,7 @@ class Run:
             "soc_end_target": self.soc_target,
             "soc_end_at_least": self.vehicle.trip.soc_end_at_least,
             "battery_used_kwh": self.battery_used_j / J_PER_KWH,
+            "certificate_g": _max_and_mean(tr.certificate_g),
             **({} if self.faults is None else {"faults": self.faults}),
             **({} if self.plant is None else {"plant": self.plant}),
         }
@@ -291,6 +294,12 @@ def flag_seconds(flags: NDArray[np.int64]) -> dict[str, int]:
     """Return for how many seconds each flag was raised, for those that were."""
     seconds = {flag: int(np.count_nonzero(flags & flag)) for flag in Flag}
     return {name: count for flag, count in seconds.items() if count for name in flag.names()}
+
+
+def _max_and_mean(values: Floats) -> dict[str, float | None]:
+    """Of the finite ones; None without any."""
+    known = values[np.isfinite(values)]
+    return {"max": _max(known), "mean": float(known.mean()) if len(known) else None}
 
 
 def _max(values: Floats) -> float | None:

@@ -27,7 +27,8 @@ class Decision(NamedTuple):
     """A command and its origin.
 
     `fallback` names the rung of the degradation ladder that was used, empty if none.
-    `relaxation_gap` and `on_share` are nan for controllers without a relaxation. `flags` says what
+    `relaxation_gap` and `on_share` are nan for controllers without a relaxation, `certificate_g`,
+    by how much the plan may at most be improved, for those that do not know it. `flags` says what
     was wrong in this second.
     """
 
@@ -37,6 +38,7 @@ class Decision(NamedTuple):
     relaxation_gap: float = float("nan")
     on_share: float = float("nan")
     flags: Flag = NOTHING_WRONG
+    certificate_g: float = float("nan")
 
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")

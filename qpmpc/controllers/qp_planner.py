@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.controllers.monitor import Flag
+from qpmpc.controllers.qp_certificate import certificate_of
 from qpmpc.controllers.ramp import RampFloor
 from qpmpc.controllers.realise import ON_THRESHOLD
 from qpmpc.controllers.receding_horizon import Plan, Planner, power_while_on_w
@@ -42,12 +43,14 @@ class QpPlan:
     Attributes
     ----------
     stages : the horizon
+    about : what it is expanded about
     x : variables, shape (n, variables), columns as in `Var`
     duals : g of fuel per SI unit of each row, shape (n, rows)
     solution : the solver's result
     """
 
     stages: Stages
+    about: Linearisation
     x: Floats
     duals: Floats
     solution: QpSolution
@@ -125,6 +128,7 @@ class QpPlanner(Planner):
             vehicle, self.model, self.preview.count, self.of_qp.qp, self.of_qp.scaling, learning
         )
         self._polish = Polish(vehicle, self.model)
+        self._certificate = certificate_of(self.qp, self.of_qp, name)
         self._ramp = RampFloor(vehicle)
         self.last: QpPlan | None = None
         self._last_step = 0
@@ -182,6 +186,9 @@ class QpPlanner(Planner):
             self._relaxation_gap(solved),
             arrival_s=solved.stages.arrival_s(self.of_qp.horizon.short_stages),
             least_w=self._ramp.least_w(solved.stages.seconds_w(short.stop), seen.soc),
+            certificate_g=self._certificate(
+                solved.stages, seen, solved.about, solved.x, solved.duals
+            ),
         )
 
     def solve(self, seen: Observation) -> QpPlan:
@@ -257,6 +264,7 @@ class QpPlanner(Planner):
             self.on_solve(Solve(data, primal, dual, cold, solution))
         return QpPlan(
             stages,
+            about,
             data.scaling.primal(solution.primal).reshape(len(stages.duration_s), -1),
             data.scaling.dual(solution.dual).reshape(len(stages.duration_s), -1),
             solution,

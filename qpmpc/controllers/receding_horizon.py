@@ -43,6 +43,7 @@ class Plan:
     relaxation_gap : slack of the relaxation at the first second, relative; nan if there is none
     arrival_s : second of the plan in which the trip ends; None where it ends later
     least_w : engine power that the first second needs at least, see `qpmpc.controllers.ramp`
+    certificate_g : cost of the plan less a proven lower bound on that of any; nan without one
     """
 
     on_share: NDArray[np.float64]
@@ -54,6 +55,7 @@ class Plan:
     flags: Flag = NOTHING_WRONG
     arrival_s: int | None = None
     least_w: float = 0.0
+    certificate_g: float = float("nan")
 
     @classmethod
     def of_means(
@@ -171,7 +173,7 @@ class RecedingHorizon(Controller):
             self._old, self._old_step = plan, seen.step
             gap, on_share = plan.relaxation_gap, float(plan.on_share[0])
             command = self._realised(plan, 0, seen)
-            return Decision(command, "", plan.iterations, gap, on_share, flags)
+            return Decision(command, "", plan.iterations, gap, on_share, flags, plan.certificate_g)
         command, rung = ruled, "rule-based"
         age = seen.step - self._old_step
         if self._old is not None and age < min(PLAN_VALID_STEPS + 1, len(self._old.on_share)):

@@ -11,7 +11,7 @@ from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.problems import shown_value
 from qpmpc.pwa.model import PwaTolerances
 from qpmpc.qp.scaling import ScalingSettings
-from qpmpc.qp.stage_qp import QpSettings
+from qpmpc.qp.settings import QpSettings
 from qpmpc.settings import apply_settings, validated
 from qpmpc.solvers.settings import AdmmSettings
 from qpmpc.vehicle.parameters import Battery
@@ -82,6 +82,7 @@ class MhQpSettings(BaseModel):
     prepared : solve the first QP before the trip starts; if not, the rules drive the first steps
         while the solver warms up
     learning : correct level and tilt of the fuel map by the fuel injected, see `LearnedFuel`
+    certificate : prove each second how good the plan is, see docs/costate.md; in Python alone
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -96,6 +97,7 @@ class MhQpSettings(BaseModel):
     polish: bool = True
     prepared: bool = True
     learning: bool = False
+    certificate: bool = False
 
 
 PAPER = MhQpSettings(

@@ -24,6 +24,7 @@ CONTROLLER_STYLES = {
     "baseline-mpc": (GREEN, "-"),
     "ecms": (ORANGE, "-"),
     "mh-nlp": (PURPLE, (0, (4, 2))),
+    "mh-costate": (BLUE, (0, (4, 2))),
 }
 SPARE_STYLES = ((BLUE, "-"), (YELLOW, "-"), (BLUE, (0, (1, 1))), (YELLOW, (0, (1, 1))))
 LIMIT: dict[str, Any] = {"color": "#AA0000", "linewidth": 0.8, "linestyle": (0, (1, 2))}

@@ -23,6 +23,7 @@ FLOWS = (
     "step_time_s",
     "iterations",
     "relaxation_gap",
+    "certificate_g",
     "on_share",
 )
 COLUMNS = ("time_s", *STATES, *FLOWS, "fallback", "flags")

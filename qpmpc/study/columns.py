@@ -38,6 +38,8 @@ FIGURES: dict[str, type] = {
     "violations.t_cl_degc": float,
     "violations.power_w": float,
     "fallback_steps": int,
+    "certificate_g.max": float,
+    "certificate_g.mean": float,
     "relaxation_gap.max": float,
     "relaxation_gap.mean": float,
     "sigma_integral_share": float,

@@ -13,18 +13,22 @@ KEYS = {
     "engine_starts_per_km", "engine_on_s", "engine_runs_below_3s_share",
     "engine_runs_below_min_on_s", "fuel_starts_g", "friction_brake_j",
     "fuel_expected_g", "fuel_off_expected_percent",
-    "soc_end_target", "soc_end_at_least", "battery_used_kwh",
+    "soc_end_target", "soc_end_at_least", "battery_used_kwh", "certificate_g",
 }  # fmt: skip
 INNER_KEYS = {
     "violations": {"soc", "t_cl_degc", "power_w"},
     "engine_on_s": {"min", "median"},
     "relaxation_gap": {"max", "mean"},
+    "certificate_g": {"max", "mean"},
     "step_time_ms": {"median", "p99", "max"},
     "solver": {"name", "implementation", "iterations_max", "iterations_median"},
 }
 
 
-ALGORITHMS = {"mh-qp": "admm f64", "mh-qp-paper": "osqp", "mh-nlp": "ipopt", "rule-based": None}
+ALGORITHMS = {
+    "mh-qp": "admm f64", "mh-qp-paper": "osqp", "mh-nlp": "ipopt", "mh-costate": "costate newton",
+    "rule-based": None,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("controller", ALGORITHMS)

@@ -33,9 +33,10 @@ def trip() -> Trip:
         ("mh-qp-paper", {}),
         ("baseline-mpc", {}),
         ("mh-nlp", {}),
+        ("mh-costate", {}),
         (CvxpyPlanner, {}),
     ],
-    ids=["python", "c", "paper", "baseline", "nlp", "cvxpy"],
+    ids=["python", "c", "paper", "baseline", "nlp", "costate", "cvxpy"],
 )
 def test_preview_solver_and_measurement(trip, controller, settings):
     if controller == "mh-nlp":

@@ -1,0 +1,192 @@
+"""`mh-costate`: plans by costates of SOC and coolant on the true curves; see docs/costate.md."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from qpmpc.controllers.ramp import RampFloor
+from qpmpc.controllers.receding_horizon import Plan, Planner
+from qpmpc.controllers.settings import SettingsLike
+from qpmpc.costate.certificate import Followed, Layout, choose, follow, violation_price_g
+from qpmpc.costate.dual import Multipliers, StageCosts
+from qpmpc.costate.path import Shortest
+from qpmpc.costate.program import Program, ProgramBuilder
+from qpmpc.costate.solve import newton
+from qpmpc.preview.horizon import HorizonSettings
+from qpmpc.preview.stages import Stages
+from qpmpc.pwa.model import PwaModel
+from qpmpc.qp.expectation import expectation
+from qpmpc.qp.linearisation import Linearisation
+from qpmpc.qp.rows import Var
+from qpmpc.qp.settings import LimitSettings
+from qpmpc.trip import Observation, Trip
+
+Floats = NDArray[np.float64]
+
+DEPARTURE_LINEARISATIONS, DEPARTURE_ROUNDS = 5, 30
+COLD_CHARGE = 1.3  # lambda where there is no plan yet, in fuel of the engine at its best
+MOST_CHARGE = 10.0  # the largest allowed, likewise
+
+
+class MhCostateSettings(BaseModel):
+    """Settings of `mh-costate`; dotted names such as `mh_costate.rounds`.
+
+    Attributes
+    ----------
+    horizon : layout of the stages, as of `mh_qp`
+    limits : terminal band and margins, as of `mh_qp.qp`; it comes nearer to a limit than an
+        iteration that is stopped, and needs less of a margin to it
+    rounds : Newton rounds of a second
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    horizon: HorizonSettings = HorizonSettings(blocks=20)
+    limits: LimitSettings = LimitSettings(t_cl_margin_k=0.1)
+    rounds: Annotated[int, Field(ge=1, le=1000)] = 8
+
+
+@dataclass(frozen=True)
+class CostatePlan:
+    """Solution of one second.
+
+    Attributes
+    ----------
+    stages, program : that it is of
+    at : multipliers of the limits
+    share : sigma of the smoothed dual, shape (n,)
+    followed : the plan, with on or off in the seconds ahead
+    bound_g : no plan of this program costs less
+    x : of the plan, columns as in `Var`, shape (n, len(Var))
+    """
+
+    stages: Stages
+    program: Program
+    at: Multipliers
+    share: Floats
+    followed: Followed
+    bound_g: float
+    x: Floats
+
+    @property
+    def certificate_g(self) -> float:
+        """By how much the plan may at most be improved."""
+        return self.followed.cost_g - self.bound_g
+
+
+class MhCostate(Planner):
+    """Multi-horizon MPC by costates: the stages of `mh-qp`, each minimised exactly.
+
+    Parameters
+    ----------
+    trip, settings : as of `Planner`
+    """
+
+    name = "mh-costate"
+    solver_name = "costate newton"
+    Settings = MhCostateSettings
+
+    def __init__(self, trip: Trip, settings: SettingsLike | None = None) -> None:
+        super().__init__(trip, settings)
+        own = self.own_settings()
+        assert isinstance(own, MhCostateSettings)
+        self._horizon, self._rounds = own.horizon, own.rounds
+        vehicle = trip.vehicle
+        self.preview = trip.preview(own.horizon)
+        self.model = PwaModel.of(vehicle)
+        self.programs = ProgramBuilder(vehicle, self.model, self.preview.count, own.limits)
+        self._ramp = RampFloor(vehicle)
+        self._shift = self.preview.shift()
+        self._shortest = Shortest.of(vehicle.engine)
+        line = self.model.line
+        best_g_per_j = float((line.fuel_g_per_s[1:] / line.power_w[1:]).min())
+        self._unit_g = best_g_per_j * self.model.battery_energy_j
+        self.last: CostatePlan | None = None
+        self._last_step = 0
+
+    def depart(self, seen: Observation) -> None:
+        """Solve the program of departure, with several linearisations."""
+        self.forget()
+        self.expects = None
+        stages = self.preview.at(seen.step)
+        about, start = self._cold(seen.t_cl_degc)
+        for _ in range(DEPARTURE_LINEARISATIONS):
+            plan = self._solve(stages, seen, about, start, DEPARTURE_ROUNDS)
+            about, start = self._about(plan.x, seen.t_cl_degc), plan.at
+        self.last, self._last_step = plan, seen.step
+        self.expects = expectation(self.trip, self._horizon, self.model, stages, plan.x)
+
+    def plan(self, seen: Observation) -> Plan:
+        """Plan with the solution of this second's program."""
+        solved = self.solve(seen)
+        if self.solver_fails:
+            return Plan.none(iterations=self._rounds)
+        short = self._horizon.short_stages
+        return Plan(
+            solved.share[:short],
+            solved.followed.power_w[:short],
+            iterations=self._rounds,
+            arrival_s=solved.stages.arrival_s(short),
+            least_w=self._ramp.least_w(solved.stages.seconds_w(short), seen.soc),
+            certificate_g=solved.certificate_g,
+        )
+
+    def solve(self, seen: Observation) -> CostatePlan:
+        """Solve the program of this second, from the last plan, shifted along.
+
+        Without one, as after a restart under way, from a guess: a round makes a usable plan of it.
+        """
+        stages = self.preview.at(seen.step)
+        about, start = self._cold(seen.t_cl_degc)
+        if self.last is not None:
+            x, charge, heat = self.last.x, self.last.at.charge, self.last.at.heat
+            for _ in range(seen.step - self._last_step):
+                x, charge, heat = x[self._shift], charge[self._shift], heat[self._shift]
+                heat[self._horizon.short_stages - 1] = 0.0  # a second's own: it is there once
+            about, start = self._about(x, seen.t_cl_degc), Multipliers(charge, heat)
+        plan = self._solve(stages, seen, about, start, self._rounds)
+        if not self.solver_fails:
+            self.last, self._last_step = plan, seen.step
+        return plan
+
+    def forget(self) -> None:
+        """Forget preview and plan, as after a restart of the controller under way."""
+        self.preview.forget()
+        self.last = None
+
+    def _about(self, x: Floats, t_cl_degc: float) -> Linearisation:
+        return Linearisation.about(x, t_cl_degc, self._horizon)
+
+    def _cold(self, t_cl_degc: float) -> tuple[Linearisation, Multipliers]:
+        n = self.preview.count
+        charge = np.full(n, COLD_CHARGE * self._unit_g)
+        return Linearisation.constant(n, t_cl_degc), Multipliers(charge, np.zeros(n))
+
+    def _solve(
+        self,
+        stages: Stages,
+        seen: Observation,
+        about: Linearisation,
+        start: Multipliers,
+        rounds: int,
+    ) -> CostatePlan:
+        program = self.programs.at(stages, seen.soc, seen.t_cl_degc, about, seen.engine_on)
+        found = newton(program, start, rounds, MOST_CHARGE * self._unit_g)
+        layout = Layout.of(stages, self._horizon, self._shortest, seen.engine_for_s)
+        exact = StageCosts.of(program, found.at, program.curves)
+        costs = found.costs.with_first(layout.short, exact)
+        choice = choose(program, found.at, costs, layout)
+        share = found.share.copy()
+        share[: layout.seconds] = choice.path.runs
+        price = violation_price_g(found.at)
+        followed = follow(program, share, costs.on.power_w, layout.short, price)
+        x = np.zeros((len(share), len(Var)))
+        x[:, Var.SOC], x[:, Var.T_CL] = followed.soc, followed.t_cl_degc
+        x[:, Var.ON], x[:, Var.START] = share, followed.starts
+        x[:, Var.P_ENG] = share * followed.power_w
+        x[:, Var.FUEL] = share * followed.fuel_g_per_s
+        x[:, Var.INTERNAL] = share * followed.internal_w + (1.0 - share) * program.off_w
+        return CostatePlan(stages, program, found.at, found.share, followed, choice.bound_g, x)
