@@ -10,7 +10,8 @@ from qpmpc.controllers.base import Controller, Decision, Progress
 from qpmpc.faults.inject import Injection
 from qpmpc.faults.models import Faults
 from qpmpc.foreign_plant import ForeignPlant
-from qpmpc.results import Run, Trajectory
+from qpmpc.results import Run
+from qpmpc.trajectory import Trajectory
 from qpmpc.trip import Observation, Trip
 
 OnStep = Callable[[Observation, Decision], None]

@@ -1,18 +1,15 @@
 """Where a run left the limits of its car, and whether any command could have kept them."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.controllers.safety import SafetyLayer
+from qpmpc.trajectory import Trajectory
 from qpmpc.trip import Observation
 from qpmpc.vehicle import Command, Plant, Vehicle
 from qpmpc.vehicle.battery import BatteryMaps
-
-if TYPE_CHECKING:
-    from qpmpc.results import Trajectory
 
 Floats = NDArray[np.float64]
 
@@ -48,7 +45,7 @@ class Excess:
         )
 
 
-def excess_of(vehicle: Vehicle, run: "Trajectory") -> Excess:
+def excess_of(vehicle: Vehicle, run: Trajectory) -> Excess:
     """Compute the excess of a run."""
     battery, thermal = vehicle.battery, vehicle.thermal
     maps = BatteryMaps(battery)
@@ -67,7 +64,7 @@ def _beyond(values: Floats, low: float, high: float) -> Floats:
     return np.maximum(np.maximum(low - values, values - high), 0.0)
 
 
-def sentence(vehicle: Vehicle, run: "Trajectory", excess: Excess) -> str:
+def sentence(vehicle: Vehicle, run: Trajectory, excess: Excess) -> str:
     """Say where limits are exceeded, by how much, and whether the trip is beyond the car.
 
     It is where no command keeps all limits of the next second, which the safety layer knows: the
@@ -95,7 +92,7 @@ def sentence(vehicle: Vehicle, run: "Trajectory", excess: Excess) -> str:
     return f"{where} limits are exceeded: {worst}"
 
 
-def _departs(vehicle: Vehicle, run: "Trajectory") -> str:
+def _departs(vehicle: Vehicle, run: Trajectory) -> str:
     """Say that the coolant is outside its limits before anything is commanded."""
     thermal, at_degc = vehicle.thermal, float(run.t_cl_degc[0])
     if thermal.t_cl_min_degc <= at_degc <= thermal.t_cl_max_degc:
@@ -107,7 +104,7 @@ def _departs(vehicle: Vehicle, run: "Trajectory") -> str:
     return f"; it departs at {at_degc:g} °C"
 
 
-def _is_safest(layer: SafetyLayer, run: "Trajectory", k: int) -> bool:
+def _is_safest(layer: SafetyLayer, run: Trajectory, k: int) -> bool:
     """Whether the safety layer leaves the command of a second as it was."""
     applied = Command(bool(run.engine_on[k]), float(run.p_eng_w[k]))
     ran, before_w = (bool(run.engine_on[k - 1]), float(run.p_eng_w[k - 1])) if k else (False, 0.0)

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.controllers.monitor import Flag
-from qpmpc.results import Run, Trajectory
+from qpmpc.results import Run
+from qpmpc.trajectory import Trajectory
 
 STATES = ("soc", "t_cl_degc")
 FLOWS = (

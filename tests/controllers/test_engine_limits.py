@@ -5,8 +5,9 @@ import pytest
 
 from qpmpc.engine_runs import ended_runs_s
 from qpmpc.registry import CONTROLLERS
-from qpmpc.results import OPTIMUM, Trajectory
+from qpmpc.results import OPTIMUM
 from qpmpc.simulation import simulate
+from qpmpc.trajectory import Trajectory
 from qpmpc.vehicle import load_vehicle
 from qpmpc.vehicle.plant import LONG_AGO_S
 from qpmpc.verification.safety.every_command import EveryCommand, Seconds

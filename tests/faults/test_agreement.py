@@ -7,7 +7,7 @@ from qpmpc.codegen.c_compiler import compiler
 from qpmpc.controllers.monitor import Flag
 from qpmpc.faults.models import as_faults
 from qpmpc.registry import make_controller, split_settings
-from qpmpc.results import Trajectory
+from qpmpc.trajectory import Trajectory
 from qpmpc.trip import Trip
 from qpmpc.verification.faults.standard import standard_faults
 
