@@ -212,3 +212,17 @@ def _sync_folder(folder: Path) -> None:
             os.fsync(handle)
     finally:
         os.close(handle)
+
+
+def around_marks(page: Path, begin: str, end: str) -> tuple[str, str]:
+    """Return the text of a page up to its first mark, and from its second on, marks included.
+
+    Raises
+    ------
+    InputError
+        If the page has not both, in this order.
+    """
+    text = page.read_text("utf-8")
+    if not 0 <= text.find(begin) < text.find(end):
+        raise InputError(f"{page}: no marks {begin} and {end}")
+    return text.partition(begin)[0] + begin, end + text.partition(end)[2]

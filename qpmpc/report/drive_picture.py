@@ -5,7 +5,8 @@ from matplotlib.figure import Figure
 
 from qpmpc.cycles.logs.elevation import filtered_elevation
 from qpmpc.cycles.read_drive import Drive
-from qpmpc.report.style import BLACK, GREEN, SKY, png, tidy
+from qpmpc.report.cycle_picture import draw_grade, finished
+from qpmpc.report.style import BLACK, SKY
 
 SAMPLE = {"linestyle": "", "marker": "o", "markersize": 3.5, "color": SKY}
 
@@ -38,14 +39,5 @@ def draw_drive(drive: Drive) -> bytes:
         axes.set_ylabel("elevation\nm")
         axes.legend(fontsize=8, frameon=False)
     if hilly:
-        others[0].plot(cycle.time_s, 100 * cycle.grade, color=GREEN)
-        others[0].set_ylabel("grade\n%")
-    for axes in panels:
-        tidy(axes)
-    panels[-1].set_xlabel("time, s")
-    panels[-1].set_xlim(0, cycle.duration_s)
-    figure.align_ylabels()
-    figure.suptitle(
-        f"{cycle.name}: {cycle.duration_s:.0f} s, {cycle.distance_m / 1e3:.2f} km", fontsize=11
-    )
-    return png(figure)
+        draw_grade(others[0], cycle)
+    return finished(figure, panels, cycle)

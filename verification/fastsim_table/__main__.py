@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from qpmpc.comparison import compare
-from qpmpc.errors import InputError
-from qpmpc.files import write_text
+from qpmpc.files import around_marks, write_text
 
 BEGIN = "<!-- fastsim: written by python -m qpmpc.verification.fastsim_table -->"
 END = "<!-- end -->"
@@ -64,11 +63,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m qpmpc.verification.fastsim_table")
     parser.add_argument("page", type=Path, nargs="?", default=Path("docs/fastsim.md"))
     page = parser.parse_args(arguments).page
-    text = page.read_text("utf-8")
-    if not 0 <= text.find(BEGIN) < text.find(END):
-        raise InputError(f"{page}: no marks {BEGIN} and {END}")
-    before, after = text.partition(BEGIN)[0], text.partition(END)[2]
-    write_text(page, f"{before}{BEGIN}\n\n{table(measured())}\n{END}{after}")
+    before, after = around_marks(page, BEGIN, END)
+    write_text(page, f"{before}\n\n{table(measured())}\n{after}")
     return 0
 
 

@@ -7,8 +7,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from qpmpc.errors import InputError
-from qpmpc.files import write_text
+from qpmpc.files import around_marks, write_text
 from qpmpc.pool import in_order
 from qpmpc.verification.faults.standard import standard_faults
 from qpmpc.verification.faults.table import measured_job, summary, table
@@ -22,9 +21,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m qpmpc.verification.faults")
     parser.add_argument("page", type=Path, nargs="?", default=Path("docs/faults.md"))
     page = parser.parse_args(arguments).page
-    text = page.read_text("utf-8")
-    if not 0 <= text.find(BEGIN) < text.find(END):
-        raise InputError(f"{page}: no marks {BEGIN} and {END}")
+    before, after = around_marks(page, BEGIN, END)
     faults = standard_faults()
     each = [(fault, car) for car in CARS for fault in faults]
     with Progress(console=Console(stderr=True), transient=True) as bar:
@@ -34,8 +31,7 @@ def main(arguments: list[str] | None = None) -> int:
     for car in CARS:
         of_car, rows = rows[: len(faults)], rows[len(faults) :]
         parts.append(f"### {car}\n\n{car}: {summary(of_car)}\n\n{table(of_car)}")
-    before, after = text.partition(BEGIN)[0], text.partition(END)[2]
-    write_text(page, before + BEGIN + "\n\n" + "\n".join(parts) + "\n" + END + after)
+    write_text(page, before + "\n\n" + "\n".join(parts) + "\n" + after)
     return 0
 
 
