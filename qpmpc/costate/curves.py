@@ -11,7 +11,7 @@ from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
 
-FUEL_TOLERANCE_G_PER_S = 1e-3  # of the chords of the line: a line made of speeds 5 rpm apart saws
+FUEL_TOLERANCE_G_PER_S = 1e-3  # of the chords of the line
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,9 @@ from qpmpc.vehicle.table import Table
 Floats = NDArray[np.float64]
 
 LINE_STEP_W = 50.0
-MAP_STEP_RPM = 5.0
+RAD_PER_S = np.pi / 30.0  # of a revolution per minute
+RATED_SHARE = 1e-3  # by which the torque limit may fall short of the rated power
+ROUNDING_W = 1e-6
 LINES_KEPT = 32  # some 80 KiB each
 
 
@@ -67,7 +69,7 @@ class OptimalLine:
             self.speed_rpm, self.fuel_g_per_s = self._from_map(engine)
         else:
             self.speed_rpm, self.fuel_g_per_s = self._given(engine)
-        self.torque_nm = self.power_w / (self.speed_rpm * (2.0 * np.pi / 60.0))
+        self.torque_nm = self.power_w / (self.speed_rpm * RAD_PER_S)
         self.fuel = Table(self.power_w, self.fuel_g_per_s)
         self.power_max_w = engine.power_max_w
 
@@ -80,25 +82,76 @@ class OptimalLine:
         return speed_rpm, np.interp(self.power_w, power_w, np.array(engine.line_fuel_g_per_s))
 
     def _from_map(self, engine: Engine) -> tuple[Floats, Floats]:
-        friction_rpm, torque_rpm = (
-            _of_map(engine.friction_speed_rpm),
-            _of_map(engine.torque_speed_rpm),
-        )
-        low = max(friction_rpm[0], torque_rpm[0])
-        high = min(friction_rpm[-1], torque_rpm[-1])
-        speed = np.arange(low, high + MAP_STEP_RPM, MAP_STEP_RPM).clip(max=high)
-        omega = speed * (2.0 * np.pi / 60.0)
-        limit_w = np.interp(speed, torque_rpm, _of_map(engine.torque_max_nm)) * omega
-        if limit_w.max() < engine.power_max_w * (1.0 - 1e-3):
+        most_w = _most_w(engine)
+        if most_w < engine.power_max_w * (1.0 - RATED_SHARE):
             raise InputError(
                 f"engine.power_max_w: {engine.power_max_w:.0f} W is above the "
-                f"{limit_w.max():.0f} W that torque_max_nm allows"
+                f"{most_w:.0f} W that torque_max_nm allows"
             )
-        fuel_w = fuel_power_w(engine, speed[None, :], self.power_w[:, None])
-        reachable = limit_w[None, :] >= np.minimum(self.power_w, limit_w.max())[:, None]
-        best = np.where(reachable, fuel_w, np.inf).argmin(axis=1)
-        fuel_g_per_s = fuel_w[np.arange(len(best)), best] / engine.lhv_j_per_kg * 1e3
-        return speed[best], fuel_g_per_s
+        power_w = np.minimum(self.power_w, most_w)
+        speed_rpm = _candidates_rpm(engine, power_w)
+        reaches = _limit_w(engine, speed_rpm) >= power_w[:, None] - ROUNDING_W
+        fuel_w = np.where(reaches, fuel_power_w(engine, speed_rpm, self.power_w[:, None]), np.inf)
+        best = (np.arange(len(power_w)), fuel_w.argmin(axis=1))
+        return speed_rpm[best], fuel_w[best] / engine.lhv_j_per_kg * 1e3
+
+
+def _limit_w(engine: Engine, speed_rpm: ArrayLike) -> Floats:
+    """Largest power at a speed, tau_max(N) omega(N)."""
+    speed = np.asarray(speed_rpm, dtype=float)
+    torque = np.interp(speed, _of_map(engine.torque_speed_rpm), _of_map(engine.torque_max_nm))
+    return np.asarray(torque * speed * RAD_PER_S)
+
+
+def _breakpoints_rpm(engine: Engine) -> Floats:
+    """Speeds of both tables within the range that they share; linear between."""
+    tables = (_of_map(engine.friction_speed_rpm), _of_map(engine.torque_speed_rpm))
+    low, high = max(table[0] for table in tables), min(table[-1] for table in tables)
+    if low >= high:
+        raise InputError("engine: friction_speed_rpm and torque_speed_rpm share no speeds")
+    inner = {speed for table in tables for speed in table if low < speed < high}
+    return np.array([low, *sorted(inner), high])
+
+
+def _most_w(engine: Engine) -> float:
+    """Largest power at any speed: of each stretch a quadratic in N."""
+    edges = _breakpoints_rpm(engine)
+    return float(
+        _limit_w(engine, np.append(edges, _vertices_rpm(edges, _limit_w(engine, edges)))).max()
+    )
+
+
+def _vertices_rpm(edges_rpm: Floats, edges_w: Floats) -> Floats:
+    """Where (c + s (N - N_0)) N is stationary between edges; shape (stretches,), clipped."""
+    begin, end = edges_rpm[:-1], edges_rpm[1:]
+    at = edges_w / edges_rpm  # c at each edge
+    slope = np.diff(at) / (end - begin)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        vertex = 0.5 * (begin - at[:-1] / slope)
+    return np.clip(np.where(slope == 0.0, begin, vertex), begin, end)
+
+
+def _candidates_rpm(engine: Engine, power_w: Floats) -> Floats:
+    """Speeds one of which is best: edges, stationary friction, and where the limit is P.
+
+    Friction K(N) N and limit tau_max(N) omega(N) are quadratics in N on each stretch, so the
+    least of f(N, P) subject to the limit is at one of these. Shape (powers, candidates).
+    """
+    edges = _breakpoints_rpm(engine)
+    stationary = _vertices_rpm(edges, fuel_power_w(engine, edges, 0.0))
+    begin, end = edges[:-1], edges[1:]
+    torque = _limit_w(engine, edges) / (edges * RAD_PER_S)
+    slope = np.diff(torque) / (end - begin)
+    # slope N^2 + (torque_0 - slope N_0) N = P / rad_per_s, by the root that is stable for slope 0
+    linear = torque[:-1] - slope * begin
+    aim = power_w[:, None] / RAD_PER_S
+    root = np.sqrt(np.maximum(linear**2 + 4.0 * slope * aim, 0.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rising = 2.0 * aim / (linear + root)
+        falling = 2.0 * aim / (linear - root)
+    at_limit = [np.clip(np.where(np.isfinite(x), x, begin), begin, end) for x in (rising, falling)]
+    fixed = np.broadcast_to(np.append(edges, stationary), (len(power_w), 2 * len(edges) - 1))
+    return np.concatenate([fixed, *at_limit], axis=1)
 
 
 @lru_cache(maxsize=LINES_KEPT)

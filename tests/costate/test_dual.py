@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from small_program import program
 
@@ -10,6 +10,7 @@ from qpmpc.costate.dual import Multipliers, dual
 from qpmpc.costate.solve import newton
 
 MOST = 3e3
+TARGET = 0.6  # SOC at arrival, unless it is eased
 CARS = st.sampled_from(["prius-nimh", "prius-liion", "paper-nimh", "paper-liion"])
 STATES = (CARS, st.integers(0, 58), st.floats(0.58, 0.62), st.floats(45.0, 88.0), st.booleans())
 
@@ -60,6 +61,8 @@ def test_it_is_concave(car, step, soc, t_cl, on, seed):
 def test_newton_finds_its_top(car, step, soc, t_cl, on):
     """From two sides, to the same value, which never falls on the way; the limits can be kept."""
     p, _ = program(car, step, soc, t_cl, on)
+    # one whose end is eased to what can just be reached has its top at endless prices
+    assume(p.soc_low[-1] >= TARGET)
     n = len(p.duration_s)
     tops = []
     for guess in (60.0, 300.0):

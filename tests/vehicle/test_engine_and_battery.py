@@ -29,16 +29,25 @@ def test_optimal_line_matches_the_reference(power_kw, fuel_g_per_s):
 def test_optimal_line_is_optimal_and_within_the_torque_limit():
     engine = VEHICLE.engine
     limit = np.interp(LINE.speed_rpm, engine.torque_speed_rpm, engine.torque_max_nm)
-    assert np.all(LINE.torque_nm <= limit * (1.0 + 1e-3))
+    assert np.all(LINE.torque_nm <= limit * (1.0 + 1e-9))
     rng = np.random.default_rng(1)
     for i in rng.integers(0, len(LINE.power_w), 200):
-        speed = np.linspace(1000.0, 5200.0, 400)
+        speed = np.linspace(1000.0, 5200.0, 40_000)
         torque = LINE.power_w[i] / (speed * np.pi / 30.0)
         allowed = torque <= np.interp(speed, engine.torque_speed_rpm, engine.torque_max_nm)
         if allowed.any():
             best = fuel_power_w(engine, speed[allowed], LINE.power_w[i]).min()
             mine = LINE.fuel_g_per_s[i] * engine.lhv_j_per_kg * 1e-3
-            assert mine <= best * (1.0 + 1e-3)  # a speed step of 5 rpm
+            assert mine <= best * (1.0 + 1e-9)
+            assert mine >= best * (1.0 - 1e-5)  # what a speed step of 0.1 rpm may miss
+
+
+def test_optimal_line_does_not_saw():
+    # Speeds on a grid snap upwards: a sawtooth of up to 4.5e-4 g/s that an optimiser exploits. The
+    # line bends where tables of the map do, and never by more than their slopes can.
+    bends = np.diff(LINE.fuel_g_per_s, 2)
+    assert bends.min() > -2e-6
+    assert np.all(np.diff(LINE.speed_rpm) >= 0.0)
 
 
 def test_peak_efficiency_is_that_of_the_real_engine():

@@ -11,7 +11,7 @@ from qpmpc.verification.checks.context import Context, Loop
 from qpmpc.verification.independent.equations import Equations, Floats
 
 DENSE = 20_000
-COARSE_FUEL_G_PER_S = 2e-6  # the fuel table is interpolated between 50 W and 5 rpm
+COARSE_FUEL_G_PER_S = 2e-6  # the fuel table is straight between 50 W
 ROUNDING = 1e-9
 TRIP_SHARE = 0.01
 TRIP_SOC = 0.02

@@ -4,6 +4,7 @@ The checks compare the product with these; nothing here calls the product's own 
 """
 
 import math
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +14,7 @@ from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
 
-SPEED_STEP_RPM = 5.0  # the plant uses the best speed of a grid this fine
+SPEED_STEP_RPM = 0.05
 GRAVITY_MPS2 = 9.81
 
 
@@ -62,12 +63,28 @@ class Equations:
         power = np.atleast_1d(np.asarray(power_w, dtype=float))
         if engine.line_power_w is not None and engine.line_fuel_g_per_s is not None:
             return np.asarray(np.interp(power, engine.line_power_w, engine.line_fuel_g_per_s))
+        assert engine.indicated_efficiency is not None
+        most_w, friction_w = self._friction
+        needed = np.minimum(power, most_w.max())
+        # the least friction of all speeds that reach as much, and that of the lowest such speed,
+        # which is between two of the grid
+        order = np.argsort(-most_w, kind="stable")
+        least_w = np.minimum.accumulate(friction_w[order])
+        reaching = np.searchsorted(-most_w[order], -needed, side="right")
+        rising = slice(0, int(most_w.argmax()) + 1)
+        lowest_w = np.interp(needed, most_w[rising], friction_w[rising])
+        drawn_w = np.minimum(least_w[reaching - 1], lowest_w)
+        return np.asarray((drawn_w + power / engine.indicated_efficiency) / self.lhv_j_per_g)
+
+    @cached_property
+    def _friction(self) -> tuple[Floats, Floats]:
+        """Largest power and friction power at each speed of a grid."""
+        engine = self.vehicle.engine
         assert engine.friction_speed_rpm is not None
         assert engine.friction_kj_per_rev_l is not None
         assert engine.torque_speed_rpm is not None
         assert engine.torque_max_nm is not None
         assert engine.displacement_l is not None
-        assert engine.indicated_efficiency is not None
         low = max(engine.friction_speed_rpm[0], engine.torque_speed_rpm[0])
         high = min(engine.friction_speed_rpm[-1], engine.torque_speed_rpm[-1])
         rpm = np.linspace(low, high, round((high - low) / SPEED_STEP_RPM) + 1)
@@ -78,9 +95,7 @@ class Equations:
         friction_w = (
             1000.0 * swept * np.interp(rpm, engine.friction_speed_rpm, engine.friction_kj_per_rev_l)
         )
-        needed = np.minimum(power, most_w.max())
-        friction = np.where(most_w >= needed[:, None], friction_w, np.inf).min(axis=1)
-        return np.asarray((friction + power / engine.indicated_efficiency) / self.lhv_j_per_g)
+        return most_w, friction_w
 
     def alpha(self, t_cl_degc: ArrayLike) -> Floats:
         """Cold multiplier."""
