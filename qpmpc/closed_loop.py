@@ -101,6 +101,7 @@ def _drive(
             *(() if foreign is None else foreign.reservations()),
         ),
         expects=controller.expects,
+        soc_price_g=controller.soc_price_g,
         vehicle=trip.vehicle,
         distance_km=trip.cycle.distance_m / 1e3,
         trajectory=record,

@@ -42,6 +42,7 @@ class Run:
     plant : what a foreign plant did not obey, as plain data; None on the vehicle's own plant
     reservations : why its controller says that its fuel cannot be compared
     expects : what its controller expected at departure
+    soc_price_g : fuel that a unit of final SOC is worth, from a controller that knows: `dp`
     """
 
     cycle: str
@@ -56,6 +57,7 @@ class Run:
     plant: dict[str, Any] | None = None
     reservations: tuple[str, ...] = ()
     expects: Expectation | None = None
+    soc_price_g: float | None = None
 
     def __str__(self) -> str:
         said = [f"{self.fuel_soc_balanced_g:.1f} g of fuel, SOC-balanced", *self.remarks]
@@ -75,9 +77,15 @@ class Run:
         return self._correction_g(float(self.trajectory.soc[-1]))
 
     def _correction_g(self, soc_end: float) -> float:
+        return self._worth_g(self._missing(soc_end))
+
+    def _missing(self, soc_end: float) -> float:
         missing = self.soc_target - soc_end
-        at_least = self.vehicle.trip.soc_end_at_least
-        return self._worth_g(max(missing, 0.0) if at_least else missing)
+        return max(missing, 0.0) if self.vehicle.trip.soc_end_at_least else missing
+
+    def fuel_balanced_at_g(self, soc_price_g: float) -> float:
+        """Fuel as if the run had ended at the SOC asked for, at a price of a unit of SOC."""
+        return self.fuel_g + soc_price_g * self._missing(float(self.trajectory.soc[-1]))
 
     def _worth_g(self, soc: float) -> float:
         trip, engine = self.vehicle.trip, self.vehicle.engine
@@ -224,6 +232,7 @@ class Run:
             "soc_end_at_least": self.vehicle.trip.soc_end_at_least,
             "battery_used_kwh": self.battery_used_j / J_PER_KWH,
             "certificate_g": _max_and_mean(tr.certificate_g),
+            "soc_price_g": self.soc_price_g,
             **({} if self.faults is None else {"faults": self.faults}),
             **({} if self.plant is None else {"plant": self.plant}),
         }
@@ -248,21 +257,37 @@ def _max(values: Floats) -> float | None:
     return float(values.max()) if len(values) else None
 
 
+def has_price(optimum: Run | None) -> bool:
+    """Whether this run of `dp`, if there is one, tells what final SOC is worth on our plant."""
+    return optimum is not None and optimum.soc_price_g is not None and optimum.plant is None
+
+
+def balanced_g(run: Run, optimum: Run | None) -> float:
+    """SOC-balanced fuel at the price of this run of `dp`, or without one at `trip.eta_eq`."""
+    if optimum is None or optimum.soc_price_g is None or optimum.plant is not None:
+        return run.fuel_soc_balanced_g
+    return run.fuel_balanced_at_g(optimum.soc_price_g)
+
+
 def compare_runs(runs: Sequence[Run]) -> list[dict[str, Any]]:
     """Return the summary of each run, compared with the others on its cycle.
 
     saving_vs_rule_percent = 100 (1 - m / m_rule),   fuel_above_dp_percent = 100 (m / m_dp - 1)
 
     with m the SOC-balanced fuel. Null where there is no such run on the cycle, or it burns
-    nothing. `comparable` of a run tells whether its own m can be trusted (see `Run`). On a foreign
-    plant there is also saving_vs_own_control_percent, with the run of that plant's own control.
+    nothing. Where `dp` is among them m is `fuel_soc_balanced_dp_g`, its final SOC at the price that
+    dynamic programming found, else `fuel_soc_balanced_g`. `comparable` of a run tells whether its
+    own m can be trusted (see `Run`). On a foreign plant, where that price is none, there is also
+    saving_vs_own_control_percent, with the run of that plant's own control.
     """
-    balanced = {(run.cycle, run.controller): run.fuel_soc_balanced_g for run in runs}
+    optima = {run.cycle: run for run in runs if run.controller == OPTIMUM}
+    balanced = {(run.cycle, run.controller): balanced_g(run, optima.get(run.cycle)) for run in runs}
 
     rows = []
     for run in runs:
+        fuel_g, priced = balanced[run.cycle, run.controller], has_price(optima.get(run.cycle))
         share = {
-            other: run.fuel_soc_balanced_g / balanced[run.cycle, other]
+            other: fuel_g / balanced[run.cycle, other]
             for other in (REFERENCE, OPTIMUM)
             if balanced.get((run.cycle, other), 0.0) > 0.0
         }
@@ -270,11 +295,12 @@ def compare_runs(runs: Sequence[Run]) -> list[dict[str, Any]]:
         against_own = {}
         if run.plant is not None:
             own_g = balanced.get((run.cycle, run.plant["name"]), 0.0)
-            percent = 100.0 * (1.0 - run.fuel_soc_balanced_g / own_g) if own_g > 0.0 else None
+            percent = 100.0 * (1.0 - fuel_g / own_g) if own_g > 0.0 else None
             against_own["saving_vs_own_control_percent"] = percent
         rows.append(
             {
                 **run.summary(),
+                "fuel_soc_balanced_dp_g": fuel_g if priced else None,
                 "saving_vs_rule_percent": None if rule is None else 100.0 * (1.0 - rule),
                 "fuel_above_dp_percent": None if optimum is None else 100.0 * (optimum - 1.0),
                 **against_own,

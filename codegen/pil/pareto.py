@@ -5,14 +5,15 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
+from qpmpc.closed_loop import drive
 from qpmpc.codegen.generate import Algorithm, Precision
 from qpmpc.codegen.pil.loop import PilResult, processor_in_the_loop
 from qpmpc.controllers.base import Progress
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.report.provenance import provenance
+from qpmpc.results import Run, balanced_g
 from qpmpc.trip import Trip
-from qpmpc.verification.dynamic_programming import DpSettings, solve_dp
-from qpmpc.verification.dynamic_programming.controller import as_fraction
+from qpmpc.verification.dynamic_programming.controller import Dp
 
 ITERATIONS = (10, 30, 50, 100)
 Job = Callable[[str], Progress]
@@ -24,20 +25,25 @@ class Pareto:
 
     Attributes
     ----------
-    dp_fuel_g : of dynamic programming, the SOC at the end as at the start
+    optimum : the run of dynamic programming
     results : one per algorithm, precision and iteration count
     """
 
-    dp_fuel_g: float
+    optimum: Run
     results: list[PilResult]
+
+    @property
+    def dp_fuel_g(self) -> float:
+        """Fuel of dynamic programming, its final SOC priced as that of all."""
+        return balanced_g(self.optimum, self.optimum)
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the figures of each run, including fuel above dynamic programming."""
         return [
             result.summary()
             | {
-                "fuel_above_dp_percent": (result.run.fuel_soc_balanced_g / self.dp_fuel_g - 1.0)
-                * 100.0
+                "fuel_above_dp_percent": 100.0
+                * (balanced_g(result.run, self.optimum) / self.dp_fuel_g - 1.0)
             }
             for result in self.results
         ]
@@ -83,11 +89,10 @@ def embedded_pareto(
     """
     name = trip.cycle.name
     report = next_job(f"{name}, dynamic programming")
-    grid = settings.of("dp", DpSettings())
-    optimum = solve_dp(trip.cycle, trip.vehicle, grid, as_fraction(report))
+    optimum = drive(trip, Dp(trip, settings), progress=report)
     results = []
     for algorithm, precision, count in product(algorithms, precisions, iterations):
         chosen = settings.with_settings({"mh_qp.admm.iterations": count})
         report = next_job(f"{name}, {algorithm} {precision} K = {count}")
         results.append(processor_in_the_loop(trip, chosen, precision, report, algorithm))
-    return Pareto(float(optimum.fuel_g.sum()), results)
+    return Pareto(optimum, results)

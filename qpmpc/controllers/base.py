@@ -69,6 +69,7 @@ class Driver:
     name: str = ""
     solver_name: str = ""
     expects: Expectation | None = None  # of the trip, once departed, where it plans that far
+    soc_price_g: float | None = None  # of a unit of final SOC, once departed, where it knows
     solver_fails: bool = False  # by injection: what the solver returns this second is unusable
     Settings: ClassVar[type[BaseModel] | None] = None
     _has_name: ClassVar[bool] = False  # its own, or from a class above it

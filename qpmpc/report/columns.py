@@ -34,6 +34,11 @@ def _marked(row: Row, key: str, digits: int) -> str:
     return text if row["comparable"] or value is None else text + NOT_COMPARABLE
 
 
+def _balanced(row: Row) -> str:
+    at_dp = row.get("fuel_soc_balanced_dp_g") is not None
+    return "fuel_soc_balanced_dp_g" if at_dp else "fuel_soc_balanced_g"
+
+
 def _range(low: float, high: float, digits: int) -> str:
     return f"{low:.{digits}f}..{high:.{digits}f}"
 
@@ -67,7 +72,7 @@ NAMES = (
 )
 FUEL = (
     Column("fuel g", lambda row: number(row["fuel_g"], 1)),
-    Column("balanced g", lambda row: _marked(row, "fuel_soc_balanced_g", 1)),
+    Column("balanced g", lambda row: _marked(row, _balanced(row), 1)),
 )
 AGAINST = (
     Column("saving %", lambda row: _marked(row, "saving_vs_rule_percent", 2)),
@@ -113,4 +118,9 @@ def notes(rows: Sequence[Row]) -> list[str]:
         )
     if any(not r["comparable"] and r["controller"] in _references(r) for r in rows):
         found.append("  percentages against such a run are no more certain than the run itself")
+    prices = {r["cycle"]: r["soc_price_g"] for r in rows if _balanced(r) != "fuel_soc_balanced_g"
+              and r["soc_price_g"] is not None}  # fmt: skip
+    if prices:
+        each = ", ".join(f"{price:.1f} on {cycle}" for cycle, price in prices.items())
+        found.append(f"final SOC at the price that dp found, in g per unit of SOC: {each}")
     return found

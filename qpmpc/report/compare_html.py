@@ -82,7 +82,8 @@ def _remarks(rows: Sequence[Row], settings: ControllerSettings) -> list[str]:
     )
     remarks = [
         "Balanced fuel is the fuel burnt plus that which the difference between initial and final "
-        "SOC is worth at the efficiency trip.eta_eq. Savings and distances compare balanced fuel.",
+        "SOC is worth: at the price that dp found where it drove the cycle, else at the efficiency "
+        "trip.eta_eq. Savings and distances compare balanced fuel.",
         "Controllers with a preview get the true trip, in the short and in the long horizon: "
         "no forecast error.",
         "Step times are wall times of one decision in this Python process, all runs one after the "

@@ -64,6 +64,7 @@ FIGURES: dict[str, type] = {
     "soc_end_target": float,
     "soc_end_at_least": bool,
     "battery_used_kwh": float,
+    "soc_price_g": float,
     "faults_effect": str,
 }
 PROVENANCE: dict[str, type] = {

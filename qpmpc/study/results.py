@@ -22,7 +22,7 @@ from qpmpc.study.run import rerun
 from qpmpc.study.store import JOURNAL, SESSIONS, STUDY, part_files, part_table, table_of
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
+    from pandas import DataFrame, Series
 
 
 class StudyResults:
@@ -149,9 +149,9 @@ class StudyResults:
 
         fuel_above_dp_percent = 100 (m / m_dp - 1),   saving_vs_rule_percent = 100 (1 - m / m_rule)
 
-        with m the SOC-balanced fuel, and the others' of the same `trip_hash`: of several runs of
-        dp the least, of several of the rules the first. NaN where one of the two is missing or not
-        comparable.
+        with m the SOC-balanced fuel, at the price of SOC that dp found where it drove the trip,
+        and the others' of the same `trip_hash`: of several runs of dp the least, of several of the
+        rules the first. NaN where one of the two is missing or not comparable.
         """
         import pandas as pd
         import pyarrow as pa
@@ -166,7 +166,7 @@ class StudyResults:
             if self.study.kind_of(key) is int:  # which pandas makes floats of, beside nothing
                 frame[SETTING + key] = pd.array(table[SETTING + key].to_pylist(), dtype="Int64")
         frame = frame.drop_duplicates("run").sort_values("run", ignore_index=True)
-        balanced = frame["fuel_soc_balanced_g"].where(frame["comparable"].eq(True))
+        balanced = _at_dp_price(frame).where(frame["comparable"].eq(True))
         by_trip = pd.DataFrame({"trip": frame["trip_hash"], "m": balanced})
         of_dp = by_trip[frame["controller"] == OPTIMUM].groupby("trip")["m"]
         of_rules = by_trip[frame["controller"] == REFERENCE].groupby("trip")["m"]
@@ -176,6 +176,16 @@ class StudyResults:
         frame["fuel_above_dp_percent"] = 100.0 * (balanced / optimum - 1.0)
         frame["saving_vs_rule_percent"] = 100.0 * (1.0 - balanced / rule)
         return frame
+
+
+def _at_dp_price(frame: "DataFrame") -> "Series[float]":
+    """SOC-balanced fuel at the price of SOC that dp found on the same trip, if it did."""
+    of_dp = frame[frame["controller"] == OPTIMUM].groupby("trip_hash")["soc_price_g"].first()
+    price = frame["trip_hash"].map(of_dp).astype(float)
+    missing = frame["soc_end_target"] - frame["soc_end"]
+    missing = missing.mask(frame["soc_end_at_least"].eq(True), missing.clip(lower=0.0))
+    at_dp = frame["fuel_g"] + price * missing
+    return at_dp.fillna(frame["fuel_soc_balanced_g"])
 
 
 def remarks_on(study: Study) -> list[str]:

@@ -100,7 +100,7 @@ def test_dynamic_programming_is_compared_too(cli, strict_json, trip, tmp_path, m
     done = cli("compare", trip, "--controllers", "mh-qp,dp", "--json", "-", *coarse)
     mh_qp, dp = strict_json(done.out)["runs"]
     assert dp["fuel_above_dp_percent"] == 0.0
-    ratio = mh_qp["fuel_soc_balanced_g"] / dp["fuel_soc_balanced_g"]
+    ratio = mh_qp["fuel_soc_balanced_dp_g"] / dp["fuel_soc_balanced_dp_g"]
     assert mh_qp["fuel_above_dp_percent"] == pytest.approx(100.0 * (ratio - 1.0), abs=1e-9)
     # it decides nothing from step to step, so it has no step times
     assert dp["step_time_ms"] == {"median": None, "p99": None, "max": None}

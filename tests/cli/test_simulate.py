@@ -13,7 +13,7 @@ KEYS = {
     "engine_starts_per_km", "engine_on_s", "engine_runs_below_3s_share",
     "engine_runs_below_min_on_s", "fuel_starts_g", "friction_brake_j",
     "fuel_expected_g", "fuel_off_expected_percent",
-    "soc_end_target", "soc_end_at_least", "battery_used_kwh", "certificate_g",
+    "soc_end_target", "soc_end_at_least", "battery_used_kwh", "certificate_g", "soc_price_g",
 }  # fmt: skip
 INNER_KEYS = {
     "violations": {"soc", "t_cl_degc", "power_w"},

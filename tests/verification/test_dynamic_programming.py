@@ -425,3 +425,25 @@ def test_without_numba_one_line_says_what_to_install() -> None:
     assert done.stdout.splitlines() == [
         "dynamic programming needs numba: install it with pip install 'qpmpc-iptm[verification]'"
     ]
+
+
+def test_price_of_final_soc_is_the_slope_of_the_optimum():
+    nycc = load_cycle("nycc")
+    ends = 0.59, 0.61
+    less, more = (
+        solve_dp(nycc, with_settings(trip__soc_end=end), QUICK).fuel_total_g for end in ends
+    )
+    price = solve_dp(nycc, VEHICLE, QUICK).soc_price_g(VEHICLE.battery)
+    # 1 %: fuel of the quick grid is exact to 0.02 g of some 6.3
+    assert price == pytest.approx((more - less) / (ends[1] - ends[0]), rel=0.01)
+
+
+def test_a_trip_that_ends_downhill_prices_charge_at_nothing():
+    flat = load_cycle("nycc")
+    grade = np.where(flat.time_s > 200.0, -0.08, 0.0)
+    hill = Cycle.from_samples("hill", flat.time_s, flat.speed_mps, grade)
+    solution = solve_dp(hill, VEHICLE, QUICK)
+    assert solution.soc[-1] > 0.61  # it arrives with more than asked for
+    assert solution.soc_price_g(VEHICLE.battery) == 0.0
+    lost = replace(solution, admissible=False)
+    assert lost.soc_price_g(VEHICLE.battery) is None

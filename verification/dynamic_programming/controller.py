@@ -31,6 +31,7 @@ class Dp(Replay):
                 f"dp: on {plan.cycle} the optimum still touches the edge of its tube after "
                 f"{len(plan.levels) - 1} tubes: its fuel may be too high"
             )
+        self.soc_price_g = plan.soc_price_g(self.trip.vehicle.battery)
         pairs = zip(plan.engine_on.tolist(), plan.p_eng_w.tolist(), strict=True)
         return [Command(on, p_eng_w) for on, p_eng_w in pairs]
 

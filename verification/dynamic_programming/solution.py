@@ -6,6 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from qpmpc.vehicle.parameters import Battery
+
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
@@ -88,5 +90,21 @@ class DpSolution:
         """Whether the trajectory stays clear of the tube's edges."""
         return self.levels[-1].clearance >= CLEARANCE
 
+    def soc_price_g(self, battery: Battery) -> float | None:
+        """Fuel that a unit of final SOC is worth; None of a trip that is not admissible.
 
+        The median of lambda_SOC since SOC was last at a limit, where it jumps: the derivative of
+        the least fuel to the SOC asked for at arrival. In the last seconds alone, with few choices
+        left, lambda_SOC is off by some percent.
+        """
+        if not self.admissible:
+            return None
+        soc = self.soc[:-1]
+        at_limit = (soc < battery.soc_min + AT_LIMIT) | (soc > battery.soc_max - AT_LIMIT)
+        at_limit[-1] = False  # of a trip that ends there
+        since = int(np.flatnonzero(at_limit)[-1]) + 1 if at_limit.any() else 0
+        return max(float(np.median(self.soc_costate_g[since:])), 0.0)
+
+
+AT_LIMIT = 0.005  # of SOC
 CLEARANCE = 0.15
