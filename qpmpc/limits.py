@@ -50,7 +50,7 @@ def excess_of(vehicle: Vehicle, run: Trajectory) -> Excess:
     battery, thermal = vehicle.battery, vehicle.thermal
     maps = BatteryMaps(battery)
     emptying = [maps.power_to_reach_w(soc, battery.soc_min, 1.0) for soc in run.soc[:-1].tolist()]
-    gives_w = np.clip(emptying, 0.0, battery.power_discharge_max_w)
+    gives_w = np.clip(emptying, 0.0, vehicle.battery_discharge_max_w)
     needed_w = run.demand_w + battery.aux_power_w
     return Excess(
         run.power_excess_w,

@@ -15,6 +15,7 @@ from qpmpc.preview.forecast import Trace
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.preview.stages import StageBuilder
 from qpmpc.vehicle import DEFAULT_VEHICLE, Plant, PlantState, Vehicle, load_vehicle
+from qpmpc.vehicle.battery import derating_remark
 from qpmpc.vehicle.belief import differences, with_settings
 from qpmpc.vehicle.plant import LONG_AGO_S
 
@@ -121,13 +122,14 @@ class Trip:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a user should know of the cycle and of its forecast, one line each."""
+        """What a user should know of the trip and of what is believed of it, one line each."""
         of_model = ""
         if self.model is not None:
             different = "; ".join(differences(self.vehicle, self.model))
             of_model = f"the model that all controllers but dp have is wrong: {different}"
         of_forecast = place.remark(self.truth, self.forecast)
-        return (*self.cycle.remarks, *filter(None, (of_forecast, of_model)))
+        of_battery = derating_remark(self.vehicle)
+        return (*self.cycle.remarks, *filter(None, (of_battery, of_forecast, of_model)))
 
     @property
     def start(self) -> Observation:

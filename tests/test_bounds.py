@@ -99,7 +99,7 @@ def refusal(settings: dict[str, object]) -> str:
 
 
 def test_all_numbers_are_found():
-    assert len(OF_VEHICLE) == 59
+    assert len(OF_VEHICLE) == 60
     assert len(OF_CONTROLLERS) > 100
     assert "battery.soc_grid[]" in [n.name for n in OF_VEHICLE]
 
@@ -140,6 +140,7 @@ def test_at_its_bounds_a_number_loads_or_a_check_of_several_names_it(number):
         ({"thermal.heat_capacity_j_per_k": 1e-3}, "greater than or equal to 4000 (given: 0.001)"),
         ({"thermal.heat_capacity_j_per_k": 4e3, "thermal.radiator_w_per_k": 1e3}, "swing within"),
         ({"battery.capacity_ah": 0.02}, "less than a step of 1 s at power_discharge_max_w"),
+        ({"battery.derating_share_per_k": 0.055}, "derating_share_per_k = 0.055 takes 0.935 of"),
         ({"battery.soc_min": 0.6, "battery.soc_max": 0.6001}, "less than a step of 1 s"),
         ({"chassis.road_load_b_n_per_mps": math.nan}, "must be a finite number"),
         ({"chassis.road_load_b_n_per_mps": -20.0}, "must not make the road load negative"),
@@ -171,6 +172,9 @@ def test_possible_combinations():
             "battery.power_charge_max_w": 10e3,
         }
     )
+    # 0.1 of the battery's power is left, to rounding
+    loaded({"battery.derating_share_per_k": 0.015, "thermal.t_amb_degc": -50.0})
+    loaded({"battery.derating_share_per_k": 0.1, "thermal.t_amb_degc": 1.0})
 
 
 @pytest.mark.parametrize("implementation", ["c", "python", "auto"])

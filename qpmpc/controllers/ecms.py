@@ -62,7 +62,7 @@ class Ecms(Controller):
         lhv_j_per_g = vehicle.engine.lhv_j_per_g
         fuel_w = alpha_at(vehicle.cold_engine, seen.t_cl_degc) * self._fuel_g_per_s * lhv_j_per_g
         heat_w = (1.0 - thermal.exhaust_share) * (fuel_w - self._power_w)
-        accepted_w = self._plant.battery.charge_limit_w(seen.soc, self._plant.step_s)
+        accepted_w = self._plant.charge_limit_w(seen.soc)
         terminal_w = seen.demand_w + battery.aux_power_w - self._power_w
         internal_w = self._plant.battery.internal_power_w(
             seen.soc, np.maximum(terminal_w, -accepted_w)
@@ -72,7 +72,7 @@ class Ecms(Controller):
             + self.equivalence_factor(seen.soc) * internal_w
             - self.heat_costate(seen.t_cl_degc) * heat_w
         )
-        allowed = terminal_w <= battery.power_discharge_max_w
+        allowed = terminal_w <= vehicle.battery_discharge_max_w
         allowed[1:] &= terminal_w[1:] >= -accepted_w
         best = int(np.where(allowed, cost_w, np.inf).argmin())
         self._sum_soc_s += vehicle.trip.soc_target - seen.soc

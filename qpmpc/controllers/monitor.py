@@ -151,7 +151,7 @@ class InputMonitor:
             start_fuel_g = vehicle.engine.start_fuel_g
             aux_w += vehicle.engine.start_energy_j / h
         p_bat = good.demand_w + aux_w - command.p_eng_w
-        accepted = maps.charge_limit_w(good.soc, h)
+        accepted = self._plant.charge_limit_w(good.soc)
         if p_bat < -accepted:  # the brakes take what the battery cannot
             p_bat = min(-accepted, aux_w - command.p_eng_w) if good.demand_w < 0.0 else p_bat
         soc = good.soc - h * maps.current_a(good.soc, p_bat) / maps.charge_c

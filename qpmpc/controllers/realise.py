@@ -50,6 +50,6 @@ def engine_runs(
     mean = float(ahead.sum()) / len(ahead)
     if not wish:
         return mean > ON_THRESHOLD
-    must = least_w > 0.0 or seen.demand_w + battery.aux_power_w > battery.power_discharge_max_w
+    must = least_w > 0.0 or seen.demand_w + battery.aux_power_w > vehicle.battery_discharge_max_w
     arrives = arrival_s is not None and arrival_s < bound_s
     return must or (mean >= ON_THRESHOLD and not arrives)

@@ -119,8 +119,8 @@ class SafetyLayer:
         battery = self._vehicle.battery
         net_w, drawn_w = seen.demand_w + battery.aux_power_w, POWER_MARGIN_W * margin
         return Interval(
-            net_w - battery.power_discharge_max_w + drawn_w,
-            max(net_w, battery.aux_power_w) + battery.power_charge_max_w - drawn_w,
+            net_w - self._vehicle.battery_discharge_max_w + drawn_w,
+            max(net_w, battery.aux_power_w) + self._vehicle.battery_charge_max_w - drawn_w,
         )
 
     def _soc_w(self, seen: Observation, margin: bool) -> Interval:
@@ -129,7 +129,8 @@ class SafetyLayer:
         net_w, aux_w = seen.demand_w + battery.aux_power_w, battery.aux_power_w
         drawn = SOC_MARGIN * margin
         emptying_w = maps.power_to_reach_w(seen.soc, battery.soc_min + drawn, step_s)
-        emptying_w = max(emptying_w, -battery.power_charge_max_w)  # far below: as fast as can be
+        # far below: as fast as can be
+        emptying_w = max(emptying_w, -self._vehicle.battery_charge_max_w)
         filling_w = maps.power_to_reach_w(seen.soc, battery.soc_max - drawn, step_s)
         if filling_w <= 0.0:
             high_w = max(net_w, aux_w) - filling_w

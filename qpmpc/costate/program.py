@@ -123,10 +123,10 @@ class ProgramBuilder:
             of_stage: Any = names[name]
             return np.array(np.broadcast_to(of_stage, (count, 1))[:, 0])
 
-        engine, battery = self._vehicle.engine, self._vehicle.battery
+        vehicle, engine = self._vehicle, self._vehicle.engine
         net, missing = stages.net_w, value("missing_w")
         low = np.maximum(engine.power_min_w, np.minimum(missing, engine.power_max_w))
-        most = np.minimum(engine.power_max_w, net + battery.power_charge_max_w)
+        most = np.minimum(engine.power_max_w, net + vehicle.battery_charge_max_w)
         must = missing > 0.0
         growing = value("growing")
         price_t = growing.copy()

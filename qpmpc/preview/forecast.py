@@ -41,9 +41,9 @@ class Trace:
         limited to what engine and battery can give together.
         """
         battery = vehicle.battery
-        most = battery.power_discharge_max_w + vehicle.engine.power_max_w
+        most = vehicle.battery_discharge_max_w + vehicle.engine.power_max_w
         net = self.demand_w + battery.aux_power_w
-        return np.clip(net, -battery.power_charge_max_w, most)
+        return np.clip(net, -vehicle.battery_charge_max_w, most)
 
     def internal_off_w(self, vehicle: Vehicle) -> NDArray[np.float64]:
         """Internal battery power of each step with the engine off, l(P0), W, shape (steps,)."""
@@ -55,5 +55,5 @@ def internal_off_w(vehicle: Vehicle, net_w: NDArray[np.float64]) -> NDArray[np.f
 
     At the trip's mean SOC; beyond the discharge limit, at that limit.
     """
-    power = np.minimum(net_w, vehicle.battery.power_discharge_max_w)
+    power = np.minimum(net_w, vehicle.battery_discharge_max_w)
     return BatteryMaps(vehicle.battery).internal_power_w(vehicle.trip.soc_mean, power)

@@ -74,7 +74,9 @@ class PwaModel:
         soc = vehicle.trip.soc_mean
         return cls(
             fuel=fuel,
-            battery=_battery(vehicle.battery, soc, tol.battery_w, tol.battery_share),
+            battery=_battery(
+                vehicle.battery, *_limits_w(vehicle), soc, tol.battery_w, tol.battery_share
+            ),
             alpha=_alpha(vehicle.cold_engine, *_alpha_range_degc(vehicle), tol.alpha),
             battery_energy_j=BatteryMaps(vehicle.battery).energy_j(soc),
             line=optimal_line(vehicle.engine),
@@ -102,8 +104,15 @@ def _fuel(engine: Engine, tolerance_g_per_s: float, knee_w: float) -> PwaFit:
 
 
 @lru_cache(maxsize=FITS_KEPT)
-def _battery(battery: Battery, soc: float, tolerance_w: float, share: float) -> PwaFit:
-    power, internal = _battery_samples(battery, soc)
+def _battery(
+    battery: Battery,
+    low_w: float,
+    high_w: float,
+    soc: float,
+    tolerance_w: float,
+    share: float,
+) -> PwaFit:
+    power, internal = _battery_samples(battery, low_w, high_w, soc)
     allowed = tolerance_w + share * np.abs(power)
     return fit_convex(power, internal, allowed, interpolation_error=_curvature_error(internal))
 
@@ -117,15 +126,19 @@ def _alpha(cold: ColdEngine, coldest: float, hottest: float, tolerance: float) -
 
 def battery_samples(vehicle: Vehicle) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Sample terminal power (W) -> internal power (W) over the battery's power range."""
-    return _battery_samples(vehicle.battery, vehicle.trip.soc_mean)
+    return _battery_samples(vehicle.battery, *_limits_w(vehicle), vehicle.trip.soc_mean)
+
+
+def _limits_w(vehicle: Vehicle) -> tuple[float, float]:
+    """Least and greatest terminal power at the trip's ambient temperature."""
+    return -vehicle.battery_charge_max_w, vehicle.battery_discharge_max_w
 
 
 def _battery_samples(
-    battery: Battery, soc: float
+    battery: Battery, low_w: float, high_w: float, soc: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    span = battery.power_discharge_max_w + battery.power_charge_max_w
-    count = int(np.ceil(span / BATTERY_STEP_W)) + 1
-    power = np.linspace(-battery.power_charge_max_w, battery.power_discharge_max_w, count)
+    count = int(np.ceil((high_w - low_w) / BATTERY_STEP_W)) + 1
+    power = np.linspace(low_w, high_w, count)
     return power, BatteryMaps(battery).internal_power_w(soc, power)
 
 

@@ -63,9 +63,9 @@ class CoolantFloor:
         for h, net, off in zip(
             durations, stages.net_w.tolist(), stages.internal_off_w.tolist(), strict=True
         ):
-            regen = min(max(-net / battery.power_charge_max_w, 0.0), 1.0)
+            regen = min(max(-net / vehicle.battery_charge_max_w, 0.0), 1.0)
             charged = USABLE * room * self._energy_j * (1.0 - regen) / max(h, 1.0)
-            power = max(net, battery.aux_power_w) + min(charged, battery.power_charge_max_w)
+            power = max(net, battery.aux_power_w) + min(charged, vehicle.battery_charge_max_w)
             power = min(max(power, engine.power_min_w), engine.power_max_w)
             fuel_w = self._factor * self._line.fuel.at(power)
             gained_k.append(h * engine_w(thermal, fuel_w, power) / per_k)

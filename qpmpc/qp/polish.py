@@ -69,11 +69,11 @@ class Polish:
         """Return that power, or `planned_w` where a charge in the battery has no price."""
         if not prices.internal > 0.0:
             return planned_w
-        engine, battery = self._vehicle.engine, self._vehicle.battery
+        vehicle, engine = self._vehicle, self._vehicle.engine
         ratio = (prices.fuel * self._slope + prices.p_eng) / prices.internal
         ratio = np.maximum(ratio, LEAST_RATIO)
         most_w = np.where(ratio > 1.0, self._discharge_w, self._charge_w)
         best_w = net_w - most_w * (1.0 - 1.0 / ratio**2)
-        low_w = max(engine.power_min_w, net_w - battery.power_discharge_max_w)
-        high_w = max(min(engine.power_max_w, net_w + battery.power_charge_max_w), low_w)
+        low_w = max(engine.power_min_w, net_w - vehicle.battery_discharge_max_w)
+        high_w = max(min(engine.power_max_w, net_w + vehicle.battery_charge_max_w), low_w)
         return min(max(float(np.maximum(best_w, self._begin_w).min()), low_w), high_w)

@@ -5,7 +5,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpmpc.vehicle.parameters import Battery
+from qpmpc.vehicle.parameters import Battery, Vehicle
 from qpmpc.vehicle.table import Table
 
 
@@ -23,8 +23,6 @@ class BatteryMaps:
         self.charge = Table(battery.soc_grid, battery.resistance_charge_ohm)
         self.charge_c = 3600.0 * battery.capacity_ah
         self._soc_grid = battery.soc_grid
-        self._soc_max = battery.soc_max
-        self._power_charge_max_w = battery.power_charge_max_w
 
     def energy_j(self, soc: float) -> float:
         """Energy of a unit of SOC about `soc`: U_oc(soc) times the capacity, in J."""
@@ -64,11 +62,6 @@ class BatteryMaps:
         current = min(current, voltage / (2.0 * resistance))  # beyond it, power falls
         return current * (voltage - resistance * current)
 
-    def charge_limit_w(self, soc: float, duration_s: float) -> float:
-        """Most power the battery accepts: its limit, or what just fills it to soc_max; >= 0."""
-        filling = -self.power_to_reach_w(soc, self._soc_max, duration_s)
-        return min(self._power_charge_max_w, max(filling, 0.0))
-
     def internal_power_w(self, soc: ArrayLike, power_w: ArrayLike) -> NDArray[np.float64]:
         """Power drawn from the store, G = U_oc I = P + R I^2, for arrays.
 
@@ -85,3 +78,16 @@ class BatteryMaps:
         resistance = np.where(power >= 0.0, self.discharge(soc), self.charge(soc))
         root = np.sqrt(np.maximum(voltage**2 - 4.0 * resistance * power, 0.0))
         return np.asarray(voltage * (voltage - root) / (2.0 * resistance))
+
+
+def derating_remark(vehicle: Vehicle) -> str:
+    """Say what the cold leaves of the battery's power limits; empty where that is all."""
+    share = vehicle.battery_power_share
+    if share == 1.0:
+        return ""
+    return (
+        f"the battery's power limits are {100.0 * share:.3g} % of the rated ones, "
+        f"{vehicle.battery_discharge_max_w / 1e3:.3g} kW and "
+        f"{vehicle.battery_charge_max_w / 1e3:.3g} kW of charge: it is taken to be at "
+        f"{vehicle.thermal.t_amb_degc:g} °C, as the air, for the whole trip"
+    )

@@ -52,10 +52,10 @@ class Capability:
         """Compute the bounds of a car with this optimal line."""
         battery, engine = vehicle.battery, vehicle.engine
         maps = BatteryMaps(battery)
-        limits_w = (battery.power_discharge_max_w, -battery.power_charge_max_w)
+        limits_w = (vehicle.battery_discharge_max_w, -vehicle.battery_charge_max_w)
         edges = (battery.soc_min, battery.soc_max)
         current = max(abs(maps.current_a(soc, power)) for soc in edges for power in limits_w)
-        most_w = battery.power_discharge_max_w + engine.power_max_w
+        most_w = vehicle.battery_discharge_max_w + engine.power_max_w
         fastest = FASTEST * _level_speed_mps(vehicle, most_w)
         weight_n = vehicle.chassis.mass_kg * GRAVITY_MPS2
         at_mean = vehicle.trip.soc_mean  # the SOC of l(P0) in a preview
@@ -68,7 +68,7 @@ class Capability:
             demand_min_w=-(GRIP * weight_n * fastest) * vehicle.chassis.eta_regen - ROUNDING_W,
             demand_max_w=STRONGEST * most_w,
             speed_max_mps=fastest,
-            net_min_w=-battery.power_charge_max_w - ROUNDING_W,
+            net_min_w=-vehicle.battery_charge_max_w - ROUNDING_W,
             net_max_w=most_w + ROUNDING_W,
             internal_min_w=inner[1] - ROUNDING_W,
             internal_max_w=inner[0] + ROUNDING_W,

@@ -39,6 +39,9 @@ Voltages = Annotated[tuple[Annotated[float, Field(ge=1.0, le=2e3)], ...], ARRAY]
 Resistances = Annotated[tuple[Annotated[float, Field(ge=1e-5, le=100.0)], ...], ARRAY]
 
 CRANKING_SHARE = 0.5  # of the battery's greatest power: a start leaves some to drive with
+DERATING_DEGC = 10.0  # ambient temperature below which the battery's power limits fall
+POWER_SHARE_LEAST = 0.1  # of the battery's rated power that the cold has to leave
+POWER_SHARE_ROUNDING = 1e-9
 SPEED_MAX_MPS = 70.0  # at which forces and losses are checked
 
 
@@ -123,7 +126,12 @@ class Thermal(Section):
 
 
 class Battery(Section):
-    """Open-circuit voltage and resistances over SOC, power and SOC limits, auxiliary load."""
+    """Open-circuit voltage and resistances over SOC, power and SOC limits, auxiliary load.
+
+    The power limits are rated ones. `derating_share_per_k` of them is lost per K of the ambient
+    below `DERATING_DEGC`; those in force are `Vehicle.battery_discharge_max_w` and
+    `battery_charge_max_w`.
+    """
 
     capacity_ah: Annotated[float, Field(ge=0.01, le=10e3)]
     soc_grid: Charges
@@ -132,6 +140,7 @@ class Battery(Section):
     resistance_charge_ohm: Resistances
     power_discharge_max_w: Annotated[float, Field(ge=100.0, le=500e3)]
     power_charge_max_w: Annotated[float, Field(ge=100.0, le=500e3)]
+    derating_share_per_k: Annotated[float, Field(ge=0.0, le=0.1)] = 0.0
     soc_min: Share
     soc_max: Share
     aux_power_w: Annotated[float, Field(ge=0.0, le=50e3)]
@@ -218,13 +227,41 @@ class Vehicle(Section):
                     f"trip.{name} must lie between battery.soc_min and battery.soc_max, "
                     f"{self.battery.soc_min:g}..{self.battery.soc_max:g} (given: {soc:g})"
                 )
-        most_j = CRANKING_SHARE * self.battery.power_discharge_max_w * STEP_S
+        lost = 1.0 - self.battery_power_share
+        if lost > 1.0 - POWER_SHARE_LEAST + POWER_SHARE_ROUNDING:
+            raise ValueError(
+                f"battery.derating_share_per_k = {self.battery.derating_share_per_k:g} takes "
+                f"{lost:.4g} of battery.power_discharge_max_w and power_charge_max_w at "
+                f"thermal.t_amb_degc = {self.thermal.t_amb_degc:g}: at least "
+                f"{POWER_SHARE_LEAST:g} of them must be left"
+            )
+        most_j = CRANKING_SHARE * self.battery_discharge_max_w * STEP_S
         if self.engine.start_energy_j > most_j:
+            derated = f" at {self.thermal.t_amb_degc:g} degC" if lost else ""
             raise ValueError(
                 f"engine.start_energy_j must be at most {most_j:g} J, {CRANKING_SHARE:.0%} of what "
-                f"battery.power_discharge_max_w gives in the {STEP_S:g} s of a start"
+                f"battery.power_discharge_max_w gives{derated} in the {STEP_S:g} s of a start"
             )
         return self
+
+    @property
+    def battery_power_share(self) -> float:
+        """Share of the battery's rated power limits in force: 1 - share max(10 degC - T_amb, 0).
+
+        The battery is taken to be at ambient temperature for the whole trip.
+        """
+        below_k = max(DERATING_DEGC - self.thermal.t_amb_degc, 0.0)
+        return 1.0 - self.battery.derating_share_per_k * below_k
+
+    @property
+    def battery_discharge_max_w(self) -> float:
+        """Most power that the battery gives on this trip, W."""
+        return self.battery_power_share * self.battery.power_discharge_max_w
+
+    @property
+    def battery_charge_max_w(self) -> float:
+        """Most power that the battery takes on this trip, W; positive."""
+        return self.battery_power_share * self.battery.power_charge_max_w
 
     def with_settings(self, settings: dict[str, object]) -> "Vehicle":
         """Return a copy with dotted keys replaced, e.g. ``{"thermal.t_amb_degc": -15}``.

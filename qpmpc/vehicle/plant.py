@@ -97,6 +97,11 @@ class Plant:
         """Return the state at the start of a trip: engine off, SOC and coolant from `trip`."""
         return PlantState(self.vehicle.trip.soc_init, self.vehicle.trip.t_cl_init_degc)
 
+    def charge_limit_w(self, soc: float) -> float:
+        """Most power the battery accepts: its limit, or what just fills it to soc_max; >= 0."""
+        filling = -self.battery.power_to_reach_w(soc, self.vehicle.battery.soc_max, self.step_s)
+        return min(self.vehicle.battery_charge_max_w, max(filling, 0.0))
+
     def step(
         self, state: PlantState, command: Command, demand_w: float, speed_mps: float
     ) -> tuple[PlantState, StepFlows]:
@@ -132,13 +137,13 @@ class Plant:
         cranking = engine.start_energy_j / h if started else 0.0
         p_bat = demand_w + battery.aux_power_w + cranking - p_eng
         friction = 0.0
-        accepted = self.battery.charge_limit_w(state.soc, h)
+        accepted = self.charge_limit_w(state.soc)
         if p_bat < -accepted:
             friction = min(-accepted - p_bat, max(-demand_w, 0.0))
             p_bat += friction
         excess = max(
             abs(p_eng - command.p_eng_w),
-            p_bat - battery.power_discharge_max_w,
+            p_bat - vehicle.battery_discharge_max_w,
             -accepted - p_bat,
         )
         wanted = p_bat

@@ -87,8 +87,15 @@ def test_recorded_cases_are_the_qps_of_the_road() -> None:
 @pytest.mark.parametrize(
     ("vehicle_changes", "changes"),
     [
-        # every branch of the rows: least engine power, fading cabin heat, early reserve
-        ({"engine.power_min_w": 3000.0, "battery.power_discharge_max_w": 9000.0}, {}),
+        # every branch of the rows: least power, derated battery, fading cabin heat, early reserve
+        (
+            {
+                "engine.power_min_w": 3000.0,
+                "battery.power_discharge_max_w": 9000.0,
+                "battery.derating_share_per_k": 0.02,
+            },
+            {},
+        ),
         ({"thermal.cabin_heat_from_degc": 35.0, "thermal.cabin_heat_full_degc": 55.0}, {}),
         ({}, {"mh_qp.qp.soc_penalty_g": 500.0}),
         ({}, {"mh_qp.qp.soc_reserve": 0.0, "mh_qp.scaling.duration_exponent": 0.0}),

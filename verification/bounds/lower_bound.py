@@ -153,7 +153,7 @@ def stored_energy_j(vehicle: Vehicle, soc: float) -> float:
 
 def _tables(cycle: Cycle, vehicle: Vehicle) -> _Tables:
     equations = Equations(vehicle)
-    engine, battery, th = vehicle.engine, vehicle.battery, vehicle.thermal
+    engine, th = vehicle.engine, vehicle.thermal
     count = int(np.ceil((th.t_cl_max_degc - th.t_cl_min_degc) / T_STEP_K))
     temperature = np.linspace(th.t_cl_min_degc, th.t_cl_max_degc, count + 1)
     alpha = equations.alpha(temperature)
@@ -171,7 +171,7 @@ def _tables(cycle: Cycle, vehicle: Vehicle) -> _Tables:
     fuel_sag = np.concatenate([[0.0], np.where(near, bend, 0.0).max(axis=1)])
     power, fuel = np.concatenate([[0.0], on]), np.concatenate([[0.0], fuel_on])
 
-    least_w, most_w = -battery.power_charge_max_w, battery.power_discharge_max_w
+    least_w, most_w = -equations.charge_max_w, equations.discharge_max_w
     samples = np.arange(least_w, most_w + 2.0 * FINE_W, FINE_W)
     internal = _least_internal_w(vehicle, samples)
     asked = equations.net_w(cycle)[:, None] - power

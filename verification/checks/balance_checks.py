@@ -61,13 +61,11 @@ def limits_kept(context: Context) -> Iterator[Check]:
     """Limits of SOC, coolant and power, from the trajectory alone."""
     for loop in context.loops:
         tr, battery, th = loop.run.trajectory, context.vehicle.battery, context.vehicle.thermal
-        engine = context.vehicle.engine
+        engine, equations = context.vehicle.engine, Equations(context.vehicle)
         excess = {
             "SOC": _beyond(tr.soc, battery.soc_min, battery.soc_max),
             "coolant, K": _beyond(tr.t_cl_degc, th.t_cl_min_degc, th.t_cl_max_degc),
-            "battery, W": _beyond(
-                tr.p_bat_w, -battery.power_charge_max_w, battery.power_discharge_max_w
-            ),
+            "battery, W": _beyond(tr.p_bat_w, -equations.charge_max_w, equations.discharge_max_w),
             "engine, W": _beyond(tr.p_eng_w, 0.0, engine.power_max_w),
             "its ramp, W": _beyond(np.diff(tr.p_eng_w, prepend=0.0), -np.inf, engine.ramp_w_per_s),
         }

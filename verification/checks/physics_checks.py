@@ -129,7 +129,7 @@ def constant_demand(context: Context) -> Iterator[Check]:
         z = solver.solve(data, None, None, cold=True).primal
         rate = float(data.q @ z) / data.scaling.cost / duration
         p = np.arange(net_w, vehicle.engine.power_max_w, 1.0)
-        p = p[p <= net_w + vehicle.battery.power_charge_max_w]
+        p = p[p <= net_w + equations.charge_max_w]
         burnt = np.max(np.multiply.outer(p, model.fuel.slope) + model.fuel.intercept, axis=1)
         line = np.multiply.outer(net_w - p, model.battery.slope) + model.battery.intercept
         share = off_w / (off_w - line.max(axis=1))

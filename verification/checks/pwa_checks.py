@@ -22,7 +22,7 @@ Curve = Callable[[Floats], Floats]
 def curves_of(vehicle: Vehicle) -> dict[str, tuple[Curve, float, float, str, float]]:
     """Each fitted curve: its truth from the equations, range, unit and allowed rounding."""
     equations = Equations(vehicle)
-    engine, battery = vehicle.engine, vehicle.battery
+    engine = vehicle.engine
     grid = np.arange(0.0, engine.power_max_w + 50.0, 50.0).clip(max=engine.power_max_w)
     table = equations.fuel_g_per_s(np.unique(grid))
     return {
@@ -35,8 +35,8 @@ def curves_of(vehicle: Vehicle) -> dict[str, tuple[Curve, float, float, str, flo
         ),
         "battery": (
             lambda p: equations.internal_w(vehicle.trip.soc_mean, p),
-            -battery.power_charge_max_w,
-            battery.power_discharge_max_w,
+            -equations.charge_max_w,
+            equations.discharge_max_w,
             "W",
             1e-6,
         ),

@@ -44,12 +44,12 @@ def power_limits(vehicle: Vehicle, demand_w: Floats) -> tuple[PowerLimits, Power
     driving_w = np.maximum(demand_w, 0.0) + battery.aux_power_w
     cranking_w = engine.start_energy_j / STEP_S
     ramp_w = engine.ramp_w_per_s * STEP_S
-    high_w = np.minimum(engine.power_max_w, driving_w + battery.power_charge_max_w)
+    high_w = np.minimum(engine.power_max_w, driving_w + vehicle.battery_charge_max_w)
     high_start_w = np.minimum(
-        engine.power_max_w, driving_w + cranking_w + battery.power_charge_max_w
+        engine.power_max_w, driving_w + cranking_w + vehicle.battery_charge_max_w
     )
-    least_w = net_w - battery.power_discharge_max_w
-    off_allowed = net_w <= battery.power_discharge_max_w
+    least_w = net_w - vehicle.battery_discharge_max_w
+    off_allowed = net_w <= vehicle.battery_discharge_max_w
     needed_w = np.minimum(least_w, engine.power_max_w)
     for k in range(len(demand_w) - 2, -1, -1):
         then_w = needed_w[k + 1]

@@ -103,7 +103,7 @@ def build_problem(cycle: Cycle, vehicle: Vehicle) -> Problem:
     )
     constants = Constants(
         charge_c=plant.battery.charge_c,
-        power_charge_max_w=battery.power_charge_max_w,
+        power_charge_max_w=vehicle.battery_charge_max_w,
         aux_power_w=battery.aux_power_w,
         cold_k=vehicle.cold_engine.k,
         cold_hot_degc=vehicle.cold_engine.hot_degc,

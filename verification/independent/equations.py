@@ -16,6 +16,7 @@ Floats = NDArray[np.float64]
 
 SPEED_STEP_RPM = 0.05
 GRAVITY_MPS2 = 9.81
+BATTERY_WEAKER_BELOW_DEGC = 10.0
 
 
 class Equations:
@@ -30,6 +31,11 @@ class Equations:
         self.vehicle = vehicle
         self.lhv_j_per_g = vehicle.engine.lhv_j_per_kg / 1000.0
         self.charge_c = vehicle.battery.capacity_ah * 3600.0
+        battery, colder_k = vehicle.battery, BATTERY_WEAKER_BELOW_DEGC - vehicle.thermal.t_amb_degc
+        weaker = battery.derating_share_per_k * np.clip(colder_k, 0.0, None)
+        # of a battery as cold as the air; there is no other use of the rated limits
+        self.discharge_max_w = float((1.0 - weaker) * battery.power_discharge_max_w)
+        self.charge_max_w = float((1.0 - weaker) * battery.power_charge_max_w)
 
     def demand_w(self, cycle: Cycle) -> Floats:
         """P_d, eq. (2), from the speed at both ends of each second."""
@@ -54,8 +60,8 @@ class Equations:
         """P0 = P_d + P_aux within the limits of battery and engine."""
         battery = self.vehicle.battery
         net = self.demand_w(cycle) + battery.aux_power_w
-        net = np.maximum(net, -battery.power_charge_max_w)
-        return np.minimum(net, battery.power_discharge_max_w + self.vehicle.engine.power_max_w)
+        net = np.maximum(net, -self.charge_max_w)
+        return np.minimum(net, self.discharge_max_w + self.vehicle.engine.power_max_w)
 
     def fuel_g_per_s(self, power_w: ArrayLike) -> Floats:
         """Fuel rate of the hot engine, on: least over speed within the torque limit; shape (m,)."""

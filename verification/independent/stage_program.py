@@ -50,7 +50,7 @@ def horizon(cycle: Cycle, vehicle: Vehicle, settings: MhQpSettings, step: int) -
     grid, equations = settings.horizon, Equations(vehicle)
     demand, net = equations.demand_w(cycle), equations.net_w(cycle)
     speed = 0.5 * (cycle.speed_mps[:-1] + cycle.speed_mps[1:])
-    give = np.minimum(net, vehicle.battery.power_discharge_max_w)
+    give = np.minimum(net, equations.discharge_max_w)
     off = equations.internal_w(_mean_soc(vehicle), give)
     steps = cycle.steps
     n, length = grid.short_stages, -(-steps // grid.blocks)
@@ -250,9 +250,9 @@ def _coolant_floor_degc(
     charge, gain = min(max(soc, cell.soc_min), cell.soc_max), np.zeros(n)
     for k in range(n):
         h, net = float(road.h[k]), float(road.net_w[k])
-        share = 1.0 - min(max(-net, 0.0), cell.power_charge_max_w) / cell.power_charge_max_w
+        share = 1.0 - min(max(-net, 0.0), equations.charge_max_w) / equations.charge_max_w
         taken_w = 0.5 * (cell.soc_max - charge) * energy_j * share / max(h, 1.0)
-        shaft = max(net, cell.aux_power_w) + min(taken_w, cell.power_charge_max_w)
+        shaft = max(net, cell.aux_power_w) + min(taken_w, equations.charge_max_w)
         shaft = min(max(shaft, engine.power_min_w), engine.power_max_w)
         burnt = float(equations.alpha(th.t_cl_min_degc) * equations.fuel_g_per_s(shaft)[0])
         kept = (1.0 - th.exhaust_share) * (burnt * equations.lhv_j_per_g - shaft)
@@ -364,9 +364,9 @@ def stage_program(
             # sigma l((sigma P0 - E)/sigma) + (1 - sigma) l(P0) <= G
             terms = {at[INTERNAL]: -1.0, at[P_ENG]: -c, at[ON]: c * net + d - off}
             rows.add("battery piece", -off, terms)
-        most = min(engine.power_max_w, net + battery.power_charge_max_w)
+        most = min(engine.power_max_w, net + equations.charge_max_w)
         rows.add("engine max", 0.0, {at[P_ENG]: 1.0, at[ON]: -most})
-        missing = net - battery.power_discharge_max_w
+        missing = net - equations.discharge_max_w
         rows.add(
             "engine min",
             -max(missing - engine.power_min_w, 0.0),
@@ -374,7 +374,7 @@ def stage_program(
         )
         rows.add("on-share max", 1.0, {at[ON]: 1.0})
         rows.add("on-share min", -(0.99 if missing > 0.0 else 0.0), {at[ON]: -1.0})
-        strongest = max(net - engine.power_max_w, -battery.power_charge_max_w)
+        strongest = max(net - engine.power_max_w, -equations.charge_max_w)
         charged = float(np.max(curves.battery.slope * strongest + curves.battery.intercept))
         reach -= h * charged / energy
         low = battery.soc_min + float(road.low_j[k]) / energy

@@ -161,7 +161,7 @@ class NlpProblem:
         power = road[4] + x[NlpVar.ABOVE] / sigma
         soc = 0.5 * (before[0] + x[NlpVar.SOC])
         t_cl = 0.5 * (before[1] + x[NlpVar.T_CL])
-        most_w = ca.fmin(net_w, vehicle.battery.power_discharge_max_w)
+        most_w = ca.fmin(net_w, vehicle.battery_discharge_max_w)
         off_w = road[3] + maps.internal_w(soc, most_w)
         off_w -= maps.internal_w(vehicle.trip.soc_mean, most_w)
         drawn_w = sigma * maps.internal_w(soc, net_w - power) + (1.0 - sigma) * off_w
@@ -229,12 +229,12 @@ class NlpProblem:
         t_cl_plan_degc : coolant at the ends of the stages in the plan of the step before, by which
             blocks are hot; without one that of now, shape (n,)
         """
-        battery, engine = self.vehicle.battery, self.vehicle.engine
+        vehicle, engine = self.vehicle, self.vehicle.engine
         net = stages.net_w
         lower, upper = np.zeros((self.stages, self.count)), np.zeros((self.stages, self.count))
-        most = np.minimum(engine.power_max_w, net + battery.power_charge_max_w)
-        least = np.maximum(engine.power_min_w, net - battery.power_discharge_max_w)
-        must, can = net > battery.power_discharge_max_w, most > engine.power_min_w
+        most = np.minimum(engine.power_max_w, net + vehicle.battery_charge_max_w)
+        least = np.maximum(engine.power_min_w, net - vehicle.battery_discharge_max_w)
+        must, can = net > vehicle.battery_discharge_max_w, most > engine.power_min_w
         least = np.minimum(least, engine.power_max_w - POWER_GAP_W)
         most = np.maximum(most, least + POWER_GAP_W)
         hot_degc = t_cl_degc if t_cl_plan_degc is None else t_cl_plan_degc
@@ -280,7 +280,7 @@ class NlpProblem:
             if trip.soc_end_at_least:
                 low[-1], high[-1] = trip.soc_target, battery.soc_max
         most_w = self.vehicle.engine.power_max_w
-        strongest = np.maximum(stages.net_w - most_w, -battery.power_charge_max_w)
+        strongest = np.maximum(stages.net_w - most_w, -self.vehicle.battery_charge_max_w)
         gain = stages.duration_s * maps.internal_power_w(trip.soc_mean, strongest)
         low = np.minimum(low, soc - np.cumsum(gain) / energy_j)
         return low, np.maximum(high, low)

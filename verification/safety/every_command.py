@@ -126,15 +126,15 @@ class EveryCommand:
         eq, soc, demand = self._equations, at.soc[:, None], at.demand_w[:, None]
         # the current that just fills the battery in a second, and what the brakes leave to it
         filling = np.maximum(battery.soc_max - soc, 0.0) * eq.charge_c
-        accepted = np.minimum(-eq.terminal_w(soc, -filling), battery.power_charge_max_w)
+        accepted = np.minimum(-eq.terminal_w(soc, -filling), eq.charge_max_w)
         asked = demand + battery.aux_power_w + cranked_w - p_eng_w
         braked = np.minimum(-accepted, asked + np.maximum(-demand, 0.0))
         p_bat = np.where(asked >= -accepted, asked, braked)
         inside_w, inside = margins * POWER_MARGIN_W, margins * SOC_MARGIN
         after = soc - eq.internal_w(soc, p_bat) / eq.voltage_v(soc) / eq.charge_c
-        most_w = battery.power_discharge_max_w
+        most_w = eq.discharge_max_w
         return (
-            _beyond(p_bat, -battery.power_charge_max_w + inside_w, most_w - inside_w),
+            _beyond(p_bat, -eq.charge_max_w + inside_w, most_w - inside_w),
             _beyond(after, battery.soc_min + inside, battery.soc_max - inside),
         )
 

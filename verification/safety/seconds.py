@@ -6,7 +6,7 @@ import numpy as np
 
 from qpmpc.errors import InputError
 from qpmpc.vehicle import Vehicle, load_vehicle, vehicle_names
-from qpmpc.verification.independent.equations import Floats
+from qpmpc.verification.independent.equations import Equations, Floats
 from qpmpc.verification.safety.every_command import Seconds
 
 
@@ -29,6 +29,7 @@ def _drawn(rng: np.random.Generator) -> Vehicle:
             "thermal.heat_capacity_j_per_k": rng.uniform(20e3, 200e3),
             "thermal.radiator_w_per_k": float(rng.choice([0.0, 150.0, 900.0])),
             "battery.aux_power_w": rng.uniform(0.0, 2000.0),
+            "battery.derating_share_per_k": float(rng.choice([0.0, 0.012])),
             "engine.power_min_w": float(rng.choice([0.0, 2000.0])),
             "engine.start_fuel_g": float(rng.choice([0.0, 0.3])),
             "engine.start_energy_j": float(rng.choice([0.0, 5e3])),
@@ -44,7 +45,7 @@ def random_seconds(vehicle: Vehicle, count: int, rng: np.random.Generator) -> Se
     battery, thermal = vehicle.battery, vehicle.thermal
     soc = _around(rng, count, battery.soc_min, battery.soc_max, (1e-6, 1e-4, 1e-3, 0.05))
     t_cl = _around(rng, count, thermal.t_cl_min_degc, thermal.t_cl_max_degc, (1e-4, 0.02, 0.3, 8.0))
-    most_w = battery.power_discharge_max_w + vehicle.engine.power_max_w
+    most_w = Equations(vehicle).discharge_max_w + vehicle.engine.power_max_w
     wide_w = rng.uniform(-1.3 * most_w, 1.3 * most_w, count)
     narrow_w = rng.normal(0.0, 3e3, count)
     running = rng.integers(0, 2, count).astype(float)
