@@ -41,6 +41,7 @@ def test_the_li_ion_car_is_the_default_one_with_another_battery():
         "resistance_charge_ohm": (0.19, 0.19, 0.19, 0.19),
         "power_discharge_max_w": 27000.0,
         "power_charge_max_w": 25000.0,
+        "derating_share_per_k": 0.0,
         "soc_min": 0.4,
         "soc_max": 0.8,
         "aux_power_w": 400.0,

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qpmpc.vehicle import load_vehicle
+from qpmpc.vehicle import Plant, load_vehicle
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.engine import OptimalLine, alpha, alpha_at, fuel_power_w
 
@@ -90,6 +90,6 @@ def test_internal_power_is_convex_in_terminal_power(soc):
 
 @given(soc=st.floats(0.4, 0.8))
 def test_charge_limit_never_overfills(soc):
-    power = MAPS.charge_limit_w(soc, 1.0)
+    power = Plant(VEHICLE).charge_limit_w(soc)
     after = soc - MAPS.current_a(soc, -power) / MAPS.charge_c
     assert after <= 0.8 + 1e-12
