@@ -10,6 +10,7 @@ from qpmpc.trajectory import Trajectory
 from qpmpc.trip import Observation
 from qpmpc.vehicle import Command, Plant, Vehicle
 from qpmpc.vehicle.battery import BatteryMaps
+from qpmpc.vehicle.must_run import SPEED_ROUNDING_MPS
 
 Floats = NDArray[np.float64]
 
@@ -27,12 +28,14 @@ class Excess:
     power_w : of the command over the limits of engine and battery
     soc, t_cl_k : at the end of each second
     shortage_w : demand beyond what engine and battery give at most, above soc_min
+    off_mps : speed beyond that at which the car may be driven with its engine off, while it is
     """
 
     power_w: Floats
     soc: Floats
     t_cl_k: Floats
     shortage_w: Floats
+    off_mps: Floats
 
     @property
     def any(self) -> NDArray[np.bool_]:
@@ -42,6 +45,7 @@ class Excess:
             | (self.soc > SOC_ROUNDING)
             | (self.t_cl_k > T_CL_ROUNDING_K)
             | (self.shortage_w > POWER_ROUNDING_W)
+            | (self.off_mps > SPEED_ROUNDING_MPS)
         )
 
 
@@ -57,6 +61,7 @@ def excess_of(vehicle: Vehicle, run: Trajectory) -> Excess:
         _beyond(run.soc[1:], battery.soc_min, battery.soc_max),
         _beyond(run.t_cl_degc[1:], thermal.t_cl_min_degc, thermal.t_cl_max_degc),
         np.maximum(needed_w - vehicle.engine.power_max_w - gives_w, 0.0),
+        np.where(run.engine_on, 0.0, _beyond(run.speed_mps, 0.0, vehicle.engine.electric_max_mps)),
     )
 
 
@@ -84,6 +89,8 @@ def sentence(vehicle: Vehicle, run: Trajectory, excess: Excess) -> str:
         (excess.t_cl_k, f"coolant {excess.t_cl_k.max():.2g} K outside "
          f"{coolant.t_cl_min_degc:g}..{coolant.t_cl_max_degc:g} °C"),
         (excess.power_w, f"power {excess.power_w.max():.3g} W beyond its limits"),
+        (excess.off_mps, f"engine off at {excess.off_mps.max():.3g} m/s more than "
+         "engine.electric_max_mps"),
     ]  # fmt: skip
     worst = ", ".join(text for values, text in parts if values.any()) + _departs(vehicle, run)
     where = f"from {seconds[0]} s on, in {len(seconds)} of {len(run.fuel_g)} s,"

@@ -107,6 +107,7 @@ static void counts(void)
 {
     const size_t places[] = {offsetof(mpc_state, old_age),
                              offsetof(mpc_state, old_arrival_s),
+                             offsetof(mpc_state, old_fast_s),
                              offsetof(mpc_state, road_age),
                              offsetof(mpc_state, phase),
                              offsetof(mpc_state, failures),

@@ -125,6 +125,12 @@ static excess excess_at(const second_start *from, int engine_on, double p_eng_w,
     return found;
 }
 
+/* Too fast for an engine that is off: no other limit counts. */
+static int is_forbidden(const second_start *from, int engine_on)
+{
+    return !engine_on && from->speed_mps > (double)mpc_par.electric_max_mps;
+}
+
 excess excess_of(const second_start *from, int engine_on, double p_eng_w)
 {
     const double cranked_w = battery_w(from, p_eng_w, cranking_w(from, engine_on));
@@ -133,6 +139,7 @@ excess excess_of(const second_start *from, int engine_on, double p_eng_w)
     for (int i = 0; i < LIMITS; i++) {
         found.of[i] = fmax(found.of[i], cranked.of[i]);
     }
+    found.of[0] = is_forbidden(from, engine_on) ? 1e30 : found.of[0];
     return found;
 }
 
@@ -201,6 +208,9 @@ int cut_short(const second_start *from, const mpc_out *out)
         return 0;
     }
     int could_go_on = 0;
+    if (is_forbidden(from, from->engine_on)) {
+        return 0;
+    }
     for (int i = 0; i < POWERS; i++) {
         const double power_w = least_w + (greatest_w(from) - least_w) * i / (POWERS - 1);
         could_go_on |= is_well_inside(from, from->engine_on, from->engine_on ? power_w : 0);

@@ -32,7 +32,8 @@ int32_t mpc_check_state(const mpc_state *state)
     const mpc_rule_memory *const rules = &state->rules;
     int32_t fine = ((state->magic == MPC_MAGIC) && (state->magic_end == MPC_MAGIC)) ? 1 : 0;
     fine &= is_count(state->old_age, MPC_NO_PLAN) & is_count(state->road_age, MPC_NO_PLAN)
-            & is_count(state->heard.age, MPC_NO_PLAN) & is_count(state->old_arrival_s, MPC_SHORT);
+            & is_count(state->heard.age, MPC_NO_PLAN) & is_count(state->old_arrival_s, MPC_SHORT)
+            & is_count(state->old_fast_s, MPC_SHORT);
     fine &= is_count(state->phase, MPC_PHASE_RUNNING) & is_count(state->solves, MPC_WARM_UP_STEPS);
     fine &= is_count(state->failures, FAILURES_FORGIVEN) & is_count(state->is_under_way, 1);
     fine &= is_count(state->depart_linearisation, MPC_DEPARTURE_LINEARISATIONS);

@@ -2,7 +2,8 @@
  *
  * On where the share of the coming second is one half at least, but the engine is started only if
  * the mean over its shortest run is one half at least and arrival is no nearer, or if the battery
- * alone cannot drive; it is stopped only if the mean over its shortest rest is one half at most.
+ * alone cannot drive or the car is too fast for an engine that is off; it is stopped only if the mean
+ * over its shortest rest is one half at most and the car is not too fast within it.
  *
  * The same in Python, with the reasons: qpmpc/controllers/realise.py.
  */
@@ -10,6 +11,7 @@
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
+#include "mpc_too_fast.h"
 
 /* Mean on-share over that many seconds of the plan from `first` on, or over all that are left. */
 static mpc_real mean_share(const mpc_state *state, int32_t first, int32_t seconds)
@@ -38,7 +40,12 @@ static int32_t keeps(const mpc_state *state, int32_t first, int32_t wish)
     if (wish != 0) {
         result = ((mean >= ON_THRESHOLD) && (is_near == 0)) ? 1 : 0;
     } else {
-        result = (mean <= ON_THRESHOLD) ? 1 : 0;
+        /* one that has passed tells nothing of those after it */
+        const int32_t fast_s = (state->old_fast_s >= first) ? (state->old_fast_s - first)
+                                                            : MPC_SHORT;
+        const int32_t is_known = (state->old_fast_s < MPC_SHORT) ? 1 : 0;
+        const int32_t is_soon = ((fast_s < bound_s) || (fast_s == 0)) ? is_known : 0;
+        result = ((mean <= ON_THRESHOLD) && (is_soon == 0)) ? 1 : 0;
     }
     return result;
 }
@@ -54,7 +61,7 @@ mpc_command mpc_realise(const mpc_state *state)
                                - mpc_par.battery_discharge_max_w;
     int32_t on = (state->old_on_share[first] >= ON_THRESHOLD) ? 1 : 0;
     int32_t must = ((on != 0) && (lacking_w > REAL(0.0))) ? 1 : 0;
-    if (least_w > REAL(0.0)) {
+    if ((least_w > REAL(0.0)) || (is_too_fast(seen->speed_mps) != 0)) {
         on = 1;
         must = 1;
     }

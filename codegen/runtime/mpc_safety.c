@@ -1,7 +1,7 @@
 /* Safety layer: the command of one second that keeps the limits, else comes nearest to them.
  *
- * Whatever the optimiser returned, the result is finite and in range, and no other command exceeds
- * the limits by less: first battery and engine power, then SOC, then coolant; where all are kept,
+ * Whatever the optimiser returned, the result is finite and in range, the engine is on where the car
+ * is too fast for one that is off, and no other such command exceeds the limits by less: first battery and engine power, then SOC, then coolant; where all are kept,
  * in the same order the limits drawn in by a margin. Of such commands it takes the one nearest to
  * the wish: the same on or off where possible, then the nearest power. While the shortest run or
  * rest of the engine is not over, the wish is that it goes on as it does.
@@ -11,6 +11,7 @@
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
+#include "mpc_too_fast.h"
 
 #define LIMITS 3
 #define NEVER_W REAL(1.0e9)
@@ -199,7 +200,7 @@ mpc_command mpc_safety_admissible(mpc_command wish, const mpc_measured *seen)
     }
     const mpc_command wanted = lasting(wish, seen);
     mpc_command command = {REAL(0.0), 0};
-    if (better(wanted.engine_on, on, off) != 0) {
+    if ((better(wanted.engine_on, on, off) | is_too_fast(seen->speed_mps)) != 0) {
         command.engine_on = 1;
         command.p_eng_w = real_clip(wanted.p_eng_w, running.low, running.high);
     }

@@ -107,6 +107,8 @@ typedef struct {
     mpc_real old_least_w;  /* of its first second, see mpc_ramp.c */
     int32_t old_age;       /* steps since then; MPC_NO_PLAN if there is none */
     int32_t old_arrival_s; /* seconds of it before arrival; MPC_SHORT if that is beyond */
+    int32_t old_fast_s;    /* seconds of it before one too fast for an engine that is off;
+                              MPC_SHORT if there is none */
     int32_t road_age;      /* seconds since the last good preview; MPC_NO_PLAN if there is none */
     int32_t phase;
     int32_t failures;             /* of the solver, in a row */

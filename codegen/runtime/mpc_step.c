@@ -6,6 +6,7 @@
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
+#include "mpc_too_fast.h"
 
 /* Apart from mpc_init, which nothing in this file may call alone (MISRA C:2012 8.7). */
 static void set_defined(mpc_state *state)
@@ -187,7 +188,12 @@ static int32_t solve(mpc_state *state)
 static void keep_plan(mpc_state *state)
 {
     state->old_arrival_s = 0;
+    state->old_fast_s = MPC_SHORT;
     for (int32_t k = 0; k < MPC_SHORT; k++) {
+        const int32_t is_fast = is_too_fast(state->stage[k].road.speed_mps);
+        if ((is_fast != 0) && (state->old_fast_s == MPC_SHORT)) {
+            state->old_fast_s = k;
+        }
         state->old_arrival_s += (state->stage[k].road.duration_s > REAL(0.0)) ? 1 : 0;
         state->old_on_share[k] = state->stage[k].x[MPC_VAR_ON];
         state->old_p_eng_w[k] = state->stage[k].x[MPC_VAR_P_ENG];

@@ -95,4 +95,5 @@ class CvxpyPlanner(Planner):
         short = slice(layout.short_stages)
         arrival_s = stages.arrival_s(layout.short_stages)
         least_w = self._ramp.least_w(stages.seconds_w(layout.short_stages), seen.soc)
-        return Plan.of_means(x[short, Var.ON], x[short, Var.P_ENG], arrival_s, least_w)
+        fast_s = stages.fast_s(layout.short_stages, self.trip.vehicle)
+        return Plan.of_means(x[short, Var.ON], x[short, Var.P_ENG], arrival_s, least_w, fast_s)

@@ -6,6 +6,7 @@ from qpmpc.controllers.base import Controller, Progress
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle.engine import alpha_at
+from qpmpc.vehicle.must_run import must_run
 from qpmpc.vehicle.plant import Command
 
 
@@ -19,7 +20,8 @@ class Ecms(Controller):
     with F fuel of the hot engine, G internal battery power, Q heat into the coolant. The
     equivalence factor follows the SOC, s = s0 + k_p e + k_i sum(e), e = SOC_target - SOC, and the
     coolant's costate mu rises linearly from 0 at the edge of the band above the lower coolant
-    limit to `heat_factor` at the limit. The safety layer has the last word.
+    limit to `heat_factor` at the limit. Off is no choice where the engine must run. The safety
+    layer has the last word.
 
     Source: the paper's introduction (PMP); the adaptation is the usual PI law on SOC.
     """
@@ -72,8 +74,11 @@ class Ecms(Controller):
             + self.equivalence_factor(seen.soc) * internal_w
             - self.heat_costate(seen.t_cl_degc) * heat_w
         )
+        must = must_run(vehicle, float(terminal_w[0]), seen.speed_mps)
         allowed = terminal_w <= vehicle.battery_discharge_max_w
+        allowed[0] = not must
         allowed[1:] &= terminal_w[1:] >= -accepted_w
-        best = int(np.where(allowed, cost_w, np.inf).argmin())
+        # where nothing is allowed, off or the least power: the safety layer does the rest
+        best = max(int(np.where(allowed, cost_w, np.inf).argmin()), int(must))
         self._sum_soc_s += vehicle.trip.soc_target - seen.soc
         return Command(best > 0, float(self._power_w[best]))

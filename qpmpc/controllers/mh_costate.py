@@ -132,6 +132,7 @@ class MhCostate(Planner):
             arrival_s=solved.stages.arrival_s(short),
             least_w=self._ramp.least_w(solved.stages.seconds_w(short), seen.soc),
             certificate_g=solved.certificate_g,
+            fast_s=solved.stages.fast_s(short, self.trip.vehicle),
         )
 
     def solve(self, seen: Observation) -> CostatePlan:

@@ -189,6 +189,7 @@ class QpPlanner(Planner):
             certificate_g=self._certificate(
                 solved.stages, seen, solved.about, solved.x, solved.duals
             ),
+            fast_s=solved.stages.fast_s(short.stop, self.trip.vehicle),
         )
 
     def solve(self, seen: Observation) -> QpPlan:

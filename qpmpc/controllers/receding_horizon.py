@@ -44,6 +44,7 @@ class Plan:
     arrival_s : second of the plan in which the trip ends; None where it ends later
     least_w : engine power that the first second needs at least, see `qpmpc.controllers.ramp`
     certificate_g : cost of the plan less a proven lower bound on that of any; nan without one
+    fast_s : first second of the plan that is too fast for an engine that is off; None without one
     """
 
     on_share: NDArray[np.float64]
@@ -56,6 +57,7 @@ class Plan:
     arrival_s: int | None = None
     least_w: float = 0.0
     certificate_g: float = float("nan")
+    fast_s: int | None = None
 
     @classmethod
     def of_means(
@@ -64,11 +66,12 @@ class Plan:
         p_eng_w: ArrayLike,
         arrival_s: int | None = None,
         least_w: float = 0.0,
+        fast_s: int | None = None,
     ) -> "Plan":
         """Return the plan of mean engine powers E = sigma P_on; shape (n,) each."""
         share, mean_w = np.asarray(on_share, dtype=float), np.asarray(p_eng_w, dtype=float)
         power_on_w = power_while_on_w(share, mean_w)
-        return cls(share, power_on_w, arrival_s=arrival_s, least_w=least_w)
+        return cls(share, power_on_w, arrival_s=arrival_s, least_w=least_w, fast_s=fast_s)
 
     @classmethod
     def none(
@@ -195,8 +198,9 @@ class RecedingHorizon(Controller):
         """On or off, at the power of the next second in which the plan runs."""
         ahead = plan.on_share[second:]
         arrival_s = None if plan.arrival_s is None else plan.arrival_s - second
+        fast_s = None if plan.fast_s is None else plan.fast_s - second
         least_w = plan.least_w if second == 0 else 0.0
-        if not engine_runs(ahead, arrival_s, seen, self.trip.vehicle, least_w):
+        if not engine_runs(ahead, arrival_s, seen, self.trip.vehicle, least_w, fast_s):
             return Command(False, 0.0)
         running = second + int(np.argmax(ahead >= ON_THRESHOLD))
         return Command(True, max(float(plan.power_on_w[running]), least_w))

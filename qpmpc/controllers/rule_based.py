@@ -3,6 +3,7 @@
 from qpmpc.controllers.base import Controller, Progress
 from qpmpc.controllers.settings import ControllerSettings, RuleBasedSettings
 from qpmpc.trip import Observation, Trip
+from qpmpc.vehicle.must_run import must_run
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.plant import Command
 
@@ -62,7 +63,7 @@ class RuleBased(Controller):
         net_w = seen.demand_w + battery.aux_power_w
         reference = vehicle.trip.soc_target + s.soc_ref_offset
         requested = net_w + s.k_soc_w * (reference - seen.soc)
-        forced = seen.soc < s.forced_below(battery) or net_w > vehicle.battery_discharge_max_w
+        forced = seen.soc < s.forced_below(battery) or must_run(vehicle, net_w, seen.speed_mps)
         shortest_s = max(s.min_on_s, vehicle.engine.min_on_s)
         is_held = seen.engine_on and seen.engine_for_s < shortest_s
         if requested > s.on_w or forced:

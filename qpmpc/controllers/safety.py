@@ -10,6 +10,7 @@ from typing import NamedTuple
 from qpmpc.trip import Observation
 from qpmpc.vehicle.engine import alpha_at
 from qpmpc.vehicle.heat import cooling_w, engine_w
+from qpmpc.vehicle.must_run import too_fast
 from qpmpc.vehicle.plant import Command, Plant
 
 # Kept from the limits where that is possible, and always from the ramp: rounding, in single
@@ -44,11 +45,12 @@ class Interval(NamedTuple):
 class SafetyLayer:
     """Corrects a command so that the next second keeps power, SOC and coolant limits.
 
-    Whatever the optimiser returned, the result is finite and in range, and no other command
-    exceeds the limits by less: first battery and engine power, then SOC, then coolant; where all
-    are kept, in the same order the limits drawn in by a margin. Of such commands it takes the one
-    nearest to the wish: the same on or off where possible, then the nearest power. While the
-    shortest run or rest of the engine is not over, the wish is that it goes on as it does.
+    Whatever the optimiser returned, the result is finite and in range, the engine is on where the
+    car is too fast for one that is off, and no other such command exceeds the limits by less:
+    first battery and engine power, then SOC, then coolant; where all are kept, in the same order
+    the limits drawn in by a margin. Of such commands it takes the one nearest to the wish: the same
+    on or off where possible, then the nearest power. While the shortest run or rest of the engine
+    is not over, the wish is that it goes on as it does.
 
     Parameters
     ----------
@@ -87,6 +89,7 @@ class SafetyLayer:
             off_excess.append(allowed_heat.distance_w(0.0))
         wish_on, wanted_w = self._lasting(wish, seen)
         on = wish_on if on_excess == off_excess else on_excess < off_excess
+        on = on or too_fast(self._vehicle, seen.speed_mps)
         if not on:
             return Command(False, 0.0)
         return Command(True, min(max(wanted_w, running.low_w), running.high_w))

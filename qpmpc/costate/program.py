@@ -14,6 +14,7 @@ from qpmpc.qp.quantities import Quantities
 from qpmpc.qp.scaling import ScalingSettings
 from qpmpc.qp.settings import LimitSettings, QpSettings
 from qpmpc.qp.stage_qp import qp_parameters
+from qpmpc.vehicle.must_run import must_run
 from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
@@ -127,7 +128,7 @@ class ProgramBuilder:
         net, missing = stages.net_w, value("missing_w")
         low = np.maximum(engine.power_min_w, np.minimum(missing, engine.power_max_w))
         most = np.minimum(engine.power_max_w, net + vehicle.battery_charge_max_w)
-        must = missing > 0.0
+        must = must_run(vehicle, net, stages.speed_mps)
         growing = value("growing")
         price_t = growing.copy()
         price_t[:-1] += growing[1:]

@@ -10,6 +10,7 @@ from qpmpc.preview.forecast import Trace, internal_off_w
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.preview.place import forecast_seconds
 from qpmpc.preview.swing import NO_LIMIT_J, swings
+from qpmpc.vehicle.must_run import too_fast
 from qpmpc.vehicle.parameters import Vehicle
 
 FIELDS = 4  # of `Stages` that are means or sums of seconds
@@ -47,6 +48,11 @@ class Stages:
         """Seconds until arrival, None where that is beyond the first `short_stages` of 1 s."""
         count = len(self.seconds_w(short_stages))
         return count if count < short_stages else None
+
+    def fast_s(self, short_stages: int, vehicle: Vehicle) -> int | None:
+        """Seconds until the first of `short_stages` that is too fast for an engine that is off."""
+        found = np.flatnonzero(too_fast(vehicle, self.speed_mps[:short_stages]))
+        return int(found[0]) if len(found) else None
 
     def seconds_w(self, short_stages: int) -> NDArray[np.float64]:
         """P0 of the seconds that come, up to `short_stages` or arrival."""

@@ -19,6 +19,7 @@ from qpmpc.qp.rows import SHORTEST_SCALE_S, VARIABLES, Rows, Var, table_of
 from qpmpc.qp.scaling import Scaling, ScalingSettings
 from qpmpc.qp.settings import QpSettings
 from qpmpc.qp.structure import QpStructure
+from qpmpc.vehicle.must_run import fastest_off_mps
 from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
@@ -77,6 +78,7 @@ def qp_parameters(
         "battery_energy_j": model.battery_energy_j,
         "battery_discharge_max_w": vehicle.battery_discharge_max_w,
         "battery_charge_max_w": vehicle.battery_charge_max_w,
+        "electric_max_mps": fastest_off_mps(vehicle),
         "soc_min": battery.soc_min,
         "soc_max": battery.soc_max,
         "soc_init": trip.soc_init,

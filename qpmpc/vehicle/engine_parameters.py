@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 
 from qpmpc.vehicle.section import (
     ARRAY,
+    SPEED_MAX_MPS,
     STEP_S,
     Celsius,
     Section,
@@ -46,6 +47,10 @@ class Engine(Section):
     A start takes `start_fuel_g`, and from the battery the energy `start_energy_j` that cranks the
     engine. Started, it is to run for `min_on_s`, stopped, to rest for `min_off_s`. While on its
     power rises by no more than `ramp_w_per_s`, at the start from 0; it falls at once.
+
+    In a second whose mean speed is above `electric_max_mps` it has to be on, at any power that its
+    limits allow, 0 included: a power split cannot hold it still any more, its generator would
+    turn too fast. The default is no limit.
     """
 
     displacement_l: Annotated[float, Field(ge=0.05, le=20.0)] | None = None
@@ -67,6 +72,7 @@ class Engine(Section):
     min_on_s: Annotated[int, Field(ge=0, le=600)] = 0
     min_off_s: Annotated[int, Field(ge=0, le=600)] = 0
     ramp_w_per_s: Annotated[float, Field(gt=0.0, le=1e6)] = 1e6  # free: no engine has so much power
+    electric_max_mps: Annotated[float, Field(ge=0.0, le=SPEED_MAX_MPS)] = SPEED_MAX_MPS
 
     @property
     def lhv_j_per_g(self) -> float:

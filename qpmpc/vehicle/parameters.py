@@ -15,6 +15,7 @@ from qpmpc.settings import apply_settings, validated
 from qpmpc.vehicle.engine_parameters import ColdEngine, Engine
 from qpmpc.vehicle.section import (
     ARRAY,
+    SPEED_MAX_MPS,
     STEP_S,
     Celsius,
     Section,
@@ -42,7 +43,6 @@ CRANKING_SHARE = 0.5  # of the battery's greatest power: a start leaves some to 
 DERATING_DEGC = 10.0  # ambient temperature below which the battery's power limits fall
 POWER_SHARE_LEAST = 0.1  # of the battery's rated power that the cold has to leave
 POWER_SHARE_ROUNDING = 1e-9
-SPEED_MAX_MPS = 70.0  # at which forces and losses are checked
 
 
 class Chassis(Section):

@@ -12,6 +12,7 @@ POINTS_MAX = 1000
 ARRAY = Field(min_length=2, max_length=POINTS_MAX, strict=False)
 
 STEP_S = 1.0  # of plant and controllers: nothing may empty, heat or cool down within one
+SPEED_MAX_MPS = 70.0  # at which forces and losses are checked
 
 
 class Section(BaseModel):

@@ -129,7 +129,7 @@ def test_start_leaves_the_battery_room_to_crank() -> None:
     vehicle = vehicle_with(start_energy_j=3500.0)
     battery = vehicle.battery
     demand = np.array([0.0, 30e3, -10e3])
-    running, starting, _ = power_limits(vehicle, demand)
+    running, starting, _ = power_limits(vehicle, demand, np.zeros(3))
     net_w = demand + battery.aux_power_w
     assert running.low_w.tolist() == [0.0, net_w[1] - battery.power_discharge_max_w, 0.0]
     assert starting.low_w[1] == running.low_w[1] + 3500.0
@@ -142,7 +142,7 @@ def test_engine_rises_in_time() -> None:
     battery = vehicle.battery
     demand = np.full(5, -battery.aux_power_w)
     demand[3] += battery.power_discharge_max_w + 25e3
-    running, starting, off_allowed = power_limits(vehicle, demand)
+    running, starting, off_allowed = power_limits(vehicle, demand, np.zeros(5))
     np.testing.assert_allclose(running.low_w, [0.0, 5e3, 15e3, 25e3, 0.0])
     np.testing.assert_allclose(starting.low_w, running.low_w)
     assert off_allowed.tolist() == [True, False, False, False, True]

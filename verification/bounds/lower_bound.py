@@ -10,8 +10,8 @@ over all engine commands, with the coolant's dynamics kept and those of SOC left
 left side is at most fuel + lam (W_0 - W_end), so that L - lam (W_0 - W_end) is a lower bound on the
 fuel. `lower_bound` maximises it over lam. No convexity is assumed, nothing linearised.
 A start burns its fuel, whose heat goes where that of other fuel goes, and its cranking adds to the
-terminal power P of that second. The ramp of the engine and its shortest runs and rests are left
-out: they only forbid.
+terminal power P of that second. Where the car is too fast for it the engine is not off. The ramp of
+the engine and its shortest runs and rests are left out: they only forbid.
 
 L(lam) is computed by dynamic programming over the coolant temperature and, where starts cost
 something, whether the engine runs; all its approximations err on the low side:
@@ -37,6 +37,7 @@ from numpy.typing import NDArray
 
 from qpmpc.cycles import Cycle
 from qpmpc.errors import InputError
+from qpmpc.vehicle.must_run import SPEED_ROUNDING_MPS
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.verification.dynamic_programming.compiled import compiled
 from qpmpc.verification.independent.equations import Equations
@@ -180,13 +181,15 @@ def _tables(cycle: Cycle, vehicle: Vehicle) -> _Tables:
     # power before the least that suffices.
     allowed = asked <= most_w + POWER_STEP_W * (np.arange(len(power)) > 0)
     allowed[1, :, 0] = False  # a start with the engine off
+    speed_mps = 0.5 * (cycle.speed_mps[1:] + cycle.speed_mps[:-1])
+    allowed[:, speed_mps > engine.electric_max_mps + 2.0 * SPEED_ROUNDING_MPS, 0] = False
     terminal = np.clip(asked, least_w, most_w)
     internal_sag = np.interp(terminal, samples, _internal_sag_w(internal))
     # where the brakes take over, G stops falling: a kink that a chord may cut off
     internal_sag += np.where(np.abs(asked - least_w) <= POWER_STEP_W, 0.25 * POWER_STEP_W, 0.0)
     internal_sag[:, :, 0] = np.max(np.abs(np.diff(internal, 2)))  # off: no chord between powers
     g = np.interp(terminal, samples, internal)
-    ua = equations.ua_w_per_k(0.5 * (cycle.speed_mps[1:] + cycle.speed_mps[:-1]))
+    ua = equations.ua_w_per_k(speed_mps)
     k_per_j = 1.0 / th.heat_capacity_j_per_k
     share = 1.0 - th.exhaust_share
     heat = share * equations.lhv_j_per_g * k_per_j

@@ -1,12 +1,14 @@
 """The optimal control problem as plain arrays: the plant's numbers, demand and power limits."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from qpmpc.cycles import Cycle
 from qpmpc.errors import InputError
 from qpmpc.vehicle import Plant, PlantState, Vehicle, demand_w
+from qpmpc.vehicle.must_run import too_fast
 from qpmpc.verification.dynamic_programming.engine_states import STEP_S, EngineStates
 from qpmpc.verification.dynamic_programming.kernels import (
     Bools,
@@ -46,6 +48,11 @@ class Problem:
     soc_init: float
     soc_end: float
     t_cl_init_degc: float
+
+    @cached_property
+    def too_fast(self) -> Bools:
+        """Whether each second is too fast for an engine that is off, shape (n,)."""
+        return too_fast(self.plant.vehicle, self.speed_mps)
 
     @property
     def steps(self) -> int:
@@ -89,7 +96,7 @@ def build_problem(cycle: Cycle, vehicle: Vehicle) -> Problem:
             f"{thermal.t_cl_max_degc:g} (given: {trip.t_cl_init_degc:g})"
         )
     demand = demand_w(cycle, vehicle)
-    running, starting, off_allowed = power_limits(vehicle, demand)
+    running, starting, off_allowed = power_limits(vehicle, demand, cycle.step_speed_mps)
     greatest_w = float(max(running.high_w.max(), starting.high_w.max()))
     lhv_j_per_g = engine.lhv_j_per_g
     fuel_per_soc = plant.battery.energy_j(trip.soc_target) / (trip.eta_eq * lhv_j_per_g)

@@ -247,7 +247,8 @@ class _Forward:
         )
         self.engine_on[k], self.p_eng_w[k] = command.engine_on, flows.p_eng_w
         self.fuel_g[k] = flows.fuel_g
-        self.admissible &= admissible and flows.power_excess_w == 0.0
+        off_too_fast = not command.engine_on and bool(problem.too_fast[k])
+        self.admissible &= admissible and flows.power_excess_w == 0.0 and not off_too_fast
 
     def result(self) -> Trajectory:
         self.soc[-1], self.t_cl_degc[-1] = self.state.soc, self.state.t_cl_degc

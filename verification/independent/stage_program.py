@@ -364,7 +364,11 @@ def stage_program(
             # sigma l((sigma P0 - E)/sigma) + (1 - sigma) l(P0) <= G
             terms = {at[INTERNAL]: -1.0, at[P_ENG]: -c, at[ON]: c * net + d - off}
             rows.add("battery piece", -off, terms)
-        most = min(engine.power_max_w, net + equations.charge_max_w)
+        fast = float(road.speed_mps[k]) - engine.electric_max_mps >= 1e-5
+        taken = net + equations.charge_max_w
+        if fast:  # the engine turns, at its least power where the battery takes less
+            taken = max(taken, engine.power_min_w)
+        most = min(engine.power_max_w, taken)
         rows.add("engine max", 0.0, {at[P_ENG]: 1.0, at[ON]: -most})
         missing = net - equations.discharge_max_w
         rows.add(
@@ -373,7 +377,7 @@ def stage_program(
             {at[P_ENG]: -1.0, at[ON]: engine.power_min_w},
         )
         rows.add("on-share max", 1.0, {at[ON]: 1.0})
-        rows.add("on-share min", -(0.99 if missing > 0.0 else 0.0), {at[ON]: -1.0})
+        rows.add("on-share min", -(0.99 if missing > 0.0 or fast else 0.0), {at[ON]: -1.0})
         strongest = max(net - engine.power_max_w, -equations.charge_max_w)
         charged = float(np.max(curves.battery.slope * strongest + curves.battery.intercept))
         reach -= h * charged / energy

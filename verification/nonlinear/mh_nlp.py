@@ -58,7 +58,13 @@ class MhNlp(Planner):
         arrival_s = solved.stages.arrival_s(self._short)
         least_w = self._ramp.least_w(solved.stages.seconds_w(self._short), seen.soc)
         return Plan(
-            on_share, powers_w, True, solved.iterations, arrival_s=arrival_s, least_w=least_w
+            on_share,
+            powers_w,
+            True,
+            solved.iterations,
+            arrival_s=arrival_s,
+            least_w=least_w,
+            fast_s=solved.stages.fast_s(self._short, self.trip.vehicle),
         )
 
     def forget(self) -> None:

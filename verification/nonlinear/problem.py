@@ -15,6 +15,7 @@ from qpmpc.qp.settings import QpSettings
 from qpmpc.qp.stage_qp import T_CL_MAX_MARGIN_K
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.heat import air_w
+from qpmpc.vehicle.must_run import must_run
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.plant import EMPTY, FULL
 from qpmpc.verification.nonlinear.maps import SmoothMaps, casadi
@@ -234,7 +235,8 @@ class NlpProblem:
         lower, upper = np.zeros((self.stages, self.count)), np.zeros((self.stages, self.count))
         most = np.minimum(engine.power_max_w, net + vehicle.battery_charge_max_w)
         least = np.maximum(engine.power_min_w, net - vehicle.battery_discharge_max_w)
-        must, can = net > vehicle.battery_discharge_max_w, most > engine.power_min_w
+        must = must_run(vehicle, net, stages.speed_mps)
+        can = must | (most > engine.power_min_w)
         least = np.minimum(least, engine.power_max_w - POWER_GAP_W)
         most = np.maximum(most, least + POWER_GAP_W)
         hot_degc = t_cl_degc if t_cl_plan_degc is None else t_cl_plan_degc

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from qpmpc.controllers.safety import POWER_MARGIN_W, SOC_MARGIN, T_CL_MARGIN_K
 from qpmpc.vehicle import Command, Vehicle
+from qpmpc.vehicle.must_run import SPEED_ROUNDING_MPS
 from qpmpc.verification.independent.equations import Equations, Floats
 
 POWERS = 1001  # tried besides the engine off
@@ -33,7 +34,8 @@ class Seconds:
 class Excess(NamedTuple):
     """Excess over the limits of battery power, SOC and coolant after the second; 0 if kept.
 
-    A start has to keep them with the power that cranks the engine and without.
+    Infinite in power with the engine off where the car is too fast for that. A start has to keep
+    them with the power that cranks the engine and without.
 
     Shape (n, commands) or (n,) each.
     """
@@ -116,6 +118,8 @@ class EveryCommand:
         if cranked_w.any():
             power_too, soc_too = self._of_battery(at, p_eng_w, cranked_w, margins)
             power, soc = np.maximum(power, power_too), np.maximum(soc, soc_too)
+        fastest = self._vehicle.engine.electric_max_mps + SPEED_ROUNDING_MPS
+        power = np.where((on == 0.0) & (at.speed_mps[:, None] > fastest), np.inf, power)
         return Excess(power, soc, self._of_coolant(at, on, p_eng_w, starts, margins))
 
     def _of_battery(

@@ -36,6 +36,7 @@ def _drawn(rng: np.random.Generator) -> Vehicle:
             "engine.ramp_w_per_s": float(rng.choice([8e3, 1e6])),
             "engine.min_on_s": int(rng.choice([0, 4])),
             "engine.min_off_s": int(rng.choice([0, 3])),
+            "engine.electric_max_mps": float(rng.choice([25.0, 70.0])),
         }
     )
 
