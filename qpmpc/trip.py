@@ -17,6 +17,7 @@ from qpmpc.preview.stages import StageBuilder
 from qpmpc.vehicle import DEFAULT_VEHICLE, Plant, PlantState, Vehicle, load_vehicle
 from qpmpc.vehicle.battery import derating_remark
 from qpmpc.vehicle.belief import differences, with_settings
+from qpmpc.vehicle.must_run import too_fast
 from qpmpc.vehicle.plant import LONG_AGO_S
 
 
@@ -128,8 +129,18 @@ class Trip:
             different = "; ".join(differences(self.vehicle, self.model))
             of_model = f"the model that all controllers but dp have is wrong: {different}"
         of_forecast = place.remark(self.truth, self.forecast)
-        of_battery = derating_remark(self.vehicle)
-        return (*self.cycle.remarks, *filter(None, (of_battery, of_forecast, of_model)))
+        of_battery, of_speed = derating_remark(self.vehicle), self._of_speed()
+        return (*self.cycle.remarks, *filter(None, (of_battery, of_speed, of_forecast, of_model)))
+
+    def _of_speed(self) -> str:
+        """Say where the engine has to run because of the speed; empty where it nowhere does."""
+        fast_s = int(np.count_nonzero(too_fast(self.vehicle, self.truth.speed_mps)))
+        if not fast_s:
+            return ""
+        return (
+            f"in {fast_s} of {self.steps} s the car is faster than engine.electric_max_mps, "
+            f"{self.vehicle.engine.electric_max_mps:g} m/s: the engine must run"
+        )
 
     @property
     def start(self) -> Observation:

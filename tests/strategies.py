@@ -12,6 +12,7 @@ NUMBERS = {
     "engine.min_on_s": st.integers(0, 600),
     "engine.min_off_s": st.integers(0, 600),
     "engine.ramp_w_per_s": st.floats(1.0, 1e6),
+    "engine.electric_max_mps": st.floats(0.0, 70.0),
     "cold_engine.k": st.floats(0.0, 1.0),
     "thermal.t_amb_degc": st.floats(-50.0, 50.0) | st.integers(-50, 50),
     "thermal.cabin_heat_w": st.floats(0.0, 1e4),

@@ -116,7 +116,10 @@ class Plant:
         command beyond the engine's limits, its ramp among them, is clipped to them; power that
         clipping and the battery leave uncovered is reported as `power_excess_w`. A start cranks the
         engine with the battery. Shortest runs and rests are not enforced: a controller may have
-        to break them to keep a limit. Whatever is asked, the states stay
+        to break them to keep a limit. Nor is the engine started where the car is too fast for one
+        that is off: as with demand beyond the battery the command is obeyed, and the excess counted
+        (`qpmpc.limits`). While on it burns at least what idling takes, in overrun too. Whatever is
+        asked, the states stay
         physical: the battery gives no more than it holds, the cabin takes no heat from coolant at
         ambient temperature, and coolant beyond `BOILING_DEGC` boils.
 

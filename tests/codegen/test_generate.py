@@ -56,6 +56,7 @@ def test_settings_reach_the_code() -> None:
 
 def test_the_limits_of_the_engine_reach_the_code() -> None:
     limits = {"start_energy_j": 3.5e3, "min_on_s": 12, "min_off_s": 2, "ramp_w_per_s": 9.5e3}
+    limits["electric_max_mps"] = 31.0
     car = load_vehicle().with_settings({f"engine.{key}": value for key, value in limits.items()})
     settings = ControllerSettings()
     numbers = values_of(car, settings.mh_qp, settings.rule_based)
@@ -63,6 +64,7 @@ def test_the_limits_of_the_engine_reach_the_code() -> None:
     for line in (
         ".start_energy_j = 3500.0,",
         ".ramp_w_per_s = 9500.0,",
+        ".electric_max_mps = 31.00001,",
         ".min_on_s = 12,",
         ".min_off_s = 2,",
         ".rule_min_on_s = 12,",  # the longer of the rules' own, 5 s, and the engine's

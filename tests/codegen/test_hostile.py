@@ -13,8 +13,8 @@ from qpmpc.vehicle import load_vehicle
 SHARED = ["bytes.c", "drive.c", "every_command.c"]
 STRICT = f"-std=c99 -O1 -g {SANITIZERS} -fno-sanitize-recover=all"
 SEED = "1"
-# An engine that has a least power, a ramp, shortest runs and rests, and takes fuel and current to
-# start shows more of the safety layer; few iterations leave the time to the seconds. Departures of
+# An engine that has a least power, a ramp, shortest runs and rests, takes fuel and current to start
+# and must run above a speed shows more of the safety layer; few iterations leave the time to the seconds. Departures of
 # four slices are finished by some trips.
 VEHICLE = load_vehicle().with_settings(
     {
@@ -24,6 +24,7 @@ VEHICLE = load_vehicle().with_settings(
         "engine.ramp_w_per_s": 8e3,
         "engine.min_on_s": 4,
         "engine.min_off_s": 3,
+        "engine.electric_max_mps": 25.0,
     }
 )
 SETTINGS: dict[str, object] = {"mh_qp.admm.iterations": 10, "mh_qp.admm.cold_iterations": 15}

@@ -46,6 +46,22 @@ def test_the_ramp_starts_the_engine_and_keeps_it_on_whatever_the_plan(seen):
     assert engine_runs(np.zeros(2), 2, seen, CAR, least_w=1.0)  # limits come before a short run
 
 
+FAST = CAR.with_settings({"engine.electric_max_mps": 9.0})  # slower than the car of these seconds
+
+
+def test_too_fast_a_car_starts_the_engine_and_keeps_it_on_whatever_the_plan():
+    for seen in (OFF, ON):
+        assert engine_runs(np.zeros(20), None, seen, FAST)
+        assert engine_runs(np.zeros(2), 1, seen, FAST)  # limits come before a short run
+    assert not engine_runs(np.zeros(20), None, ON._replace(speed_mps=9.0), FAST)
+
+
+@pytest.mark.parametrize(("fast_s", "runs"), [(None, False), (2, False), (1, True), (-1, False)])
+def test_no_stop_before_a_second_that_would_cut_the_rest_short(fast_s, runs):
+    assert engine_runs(np.zeros(20), None, ON, CAR, fast_s=fast_s) is runs
+    assert not engine_runs(np.zeros(20), None, OFF, CAR, fast_s=fast_s)
+
+
 @given(SHARES, st.none() | st.integers(1, 19), st.booleans())
 def test_an_engine_without_limits_follows_the_share(on_share, arrival_s, engine_on):
     seen = OFF._replace(engine_on=engine_on)

@@ -100,6 +100,7 @@ def test_recorded_cases_are_the_qps_of_the_road() -> None:
         ({}, {"mh_qp.qp.soc_penalty_g": 500.0}),
         ({}, {"mh_qp.qp.soc_reserve": 0.0, "mh_qp.scaling.duration_exponent": 0.0}),
         ({"trip.soc_init": 0.45}, {"mh_qp.horizon.classes": 1, "mh_qp.qp.terminal_low": 0.99}),
+        ({"engine.power_min_w": 3000.0, "engine.electric_max_mps": 5.0}, {}),
         ({"engine.start_fuel_g": 0.3}, {}),
         ({"engine.start_energy_j": 4000.0}, {}),
         ({"engine.start_fuel_g": 0.2, "engine.start_energy_j": 4000.0}, {}),

@@ -77,6 +77,18 @@ def starting_bound(trip, starting):
     return lower_bound(trip, starting)
 
 
+def test_nothing_is_below_it_where_the_engine_must_run_for_the_speed(trip, bound):
+    vehicle = VEHICLE.with_settings({"engine.electric_max_mps": 6.0})
+    limited = lower_bound(trip, vehicle)
+    assert limited.fuel_g > bound.fuel_g
+    for name in ("mh-qp", "ecms"):
+        run = simulate(trip, name, vehicle)
+        fast = run.trajectory.speed_mps > 6.0
+        assert fast.sum() > 10
+        assert run.trajectory.engine_on[fast].all()
+        assert priced_g(run, limited) >= limited.fuel_g
+
+
 @pytest.mark.parametrize("seed", range(10))
 def test_no_random_drive_is_below_it_where_starts_cost_something(
     trip, starting, starting_bound, seed

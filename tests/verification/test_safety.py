@@ -15,6 +15,7 @@ LIMITS = {
     "engine.min_on_s": 4,
     "engine.min_off_s": 2,
     "engine.ramp_w_per_s": 9.5e3,
+    "engine.electric_max_mps": 8.0,
 }
 
 
