@@ -14,8 +14,8 @@ SHARED = ["bytes.c", "drive.c", "every_command.c"]
 STRICT = f"-std=c99 -O1 -g {SANITIZERS} -fno-sanitize-recover=all"
 SEED = "1"
 # An engine that has a least power, a ramp, shortest runs and rests, takes fuel and current to start
-# and must run above a speed shows more of the safety layer; few iterations leave the time to the seconds. Departures of
-# four slices are finished by some trips.
+# and must run above a speed shows more of the safety layer; few iterations leave the time to the
+# seconds. Departures of four slices are finished by some trips.
 VEHICLE = load_vehicle().with_settings(
     {
         "engine.start_fuel_g": 0.3,
