@@ -266,7 +266,8 @@ MUTATIONS = [
     ),
     Mutation(
         "engine on whatever the share", RecedingHorizon, "_realised",
-        "if not engine_runs(ahead, arrival_s, seen, self.trip.vehicle, least_w):", "if False:",
+        "if not engine_runs(ahead, arrival_s, seen, self.trip.vehicle, least_w, fast_s):",
+        "if False:",
         (limits_kept, bound_below_everything, relaxation_tight),
         also=Replacement(
             qpmpc.controllers.qp_planner, "power_while_on_w",
