@@ -99,7 +99,7 @@ def refusal(settings: dict[str, object]) -> str:
 
 
 def test_all_numbers_are_found():
-    assert len(OF_VEHICLE) == 60
+    assert len(OF_VEHICLE) == 61
     assert len(OF_CONTROLLERS) > 100
     assert "battery.soc_grid[]" in [n.name for n in OF_VEHICLE]
 
