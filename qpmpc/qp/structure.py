@@ -63,6 +63,15 @@ class QpStructure:
         """Order the entries (n, entries) as the data vector of the CSC matrix."""
         return np.asarray(values.ravel()[self._order])
 
+    @property
+    def entries(self) -> int:
+        """Length of A's data vector."""
+        return len(self._order)
+
+    def positions(self) -> sp.csc_matrix:
+        """Return A with each entry's place in its data vector, counted from 1, as its value."""
+        return self.matrix_of(np.arange(1.0, self.entries + 1.0))
+
     def matrix_of(self, data: NDArray[np.float64]) -> sp.csc_matrix:
         """Build A from its data vector; only set-up and tests need it."""
         return sp.csc_matrix((data, self._indices, self._indptr), shape=self.shape)

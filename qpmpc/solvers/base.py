@@ -1,5 +1,6 @@
 """The interface of QP backends: set up once, then solve with new values, warm-started."""
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
@@ -34,6 +35,7 @@ class QpSolution:
     iterations : of the solver's own kind
     solve_s, update_s : wall time of the solve alone and of the update of values before it, s;
         for reports only, never for decisions
+    own_s : the solve by the solver's own clock, without the call from Python; nan where it has none
     """
 
     primal: Floats
@@ -42,6 +44,7 @@ class QpSolution:
     iterations: int
     solve_s: float
     update_s: float = 0.0
+    own_s: float = math.nan
 
     @property
     def usable(self) -> bool:

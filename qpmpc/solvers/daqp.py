@@ -30,6 +30,7 @@ class Daqp(TimedSolver):
 
     name = "daqp"
     package = "daqp"
+    max_iterations = 10_000
 
     def _start(self, structure: QpStructure, data: QpData) -> None:
         self._pattern = structure
@@ -40,7 +41,7 @@ class Daqp(TimedSolver):
             "dual_tol": self.tolerance,
             "eta_prox": self.tolerance,
             "eps_prox": PROXIMAL_WEIGHT,
-            "iter_limit": 10_000,
+            "iter_limit": self.limit,
         }
         self._solver.setup(*self._values(data), sense=self._sense())
 
@@ -59,7 +60,13 @@ class Daqp(TimedSolver):
         return np.diag(data.hessian), data.q, a, data.upper, data.lower
 
     def _run(self, data: QpData, primal: Floats | None, dual: Floats | None) -> Outcome:
+        if primal is None:
+            self._start(self._pattern, data)  # cold: without the last working set
         x, _, flag, info = self._solver.solve()
         return Outcome(
-            array(x), array(info["lam"]), _STATUS.get(flag, Status.FAILED), int(info["iterations"])
+            array(x),
+            array(info["lam"]),
+            _STATUS.get(flag, Status.FAILED),
+            int(info["iterations"]),
+            float(info["solve_time"]),
         )

@@ -28,21 +28,18 @@ class PickedRows:
 
     Parameters
     ----------
-    structure, data : pattern of A and one set of its values
+    structure : pattern of A
     rows : which rows, in the required order
     sign : +1 or -1 for each of them; all +1 if None
     """
 
-    def __init__(
-        self, structure: QpStructure, data: QpData, rows: Indices, sign: Floats | None = None
-    ) -> None:
-        position = structure.matrix_of(np.arange(1.0, len(data.a_data) + 1.0))
-        picked = position.tocsr()[rows].tocsc()
+    def __init__(self, structure: QpStructure, rows: Indices, sign: Floats | None = None) -> None:
+        picked = structure.positions().tocsr()[rows].tocsc()
         picked.sort_indices()
         self.rows = rows
         self._from = (picked.data - 1.0).astype(np.intp)
         self._sign = (np.ones(len(rows)) if sign is None else sign)[picked.indices]
-        self._shape, self._indices, self._indptr = picked.shape, picked.indices, picked.indptr
+        self.shape, self.indices, self.indptr = picked.shape, picked.indices, picked.indptr
 
     def values(self, data: QpData) -> Floats:
         """Non-zeros of these rows, in CSC order."""
@@ -51,7 +48,7 @@ class PickedRows:
 
     def matrix(self, data: QpData) -> sp.csc_matrix:
         """Return these rows of A."""
-        return sp.csc_matrix((self.values(data), self._indices, self._indptr), shape=self._shape)
+        return sp.csc_matrix((self.values(data), self.indices, self.indptr), shape=self.shape)
 
 
 class TwoSided:
@@ -64,8 +61,8 @@ class TwoSided:
 
     def __init__(self, structure: QpStructure, data: QpData) -> None:
         self._equal = data.lower == data.upper
-        self.equalities = PickedRows(structure, data, np.flatnonzero(self._equal))
-        self.inequalities = PickedRows(structure, data, np.flatnonzero(~self._equal))
+        self.equalities = PickedRows(structure, np.flatnonzero(self._equal))
+        self.inequalities = PickedRows(structure, np.flatnonzero(~self._equal))
 
     def fits(self, data: QpData) -> bool:
         """Whether the same rows are equalities as when they were sorted."""
@@ -103,11 +100,10 @@ class OneSided:
         equal, above, below = (np.flatnonzero(mask) for mask in self._masks)
         sign = np.concatenate([np.ones(len(above)), -np.ones(len(below))])
         both = np.concatenate([above, below])
-        self.equalities = PickedRows(structure, data, equal)
-        self.inequalities = PickedRows(structure, data, both, sign)
+        self.equalities = PickedRows(structure, equal)
+        self.inequalities = PickedRows(structure, both, sign)
         self.all = PickedRows(
             structure,
-            data,
             np.concatenate([equal, both]),
             np.concatenate([np.ones(len(equal)), sign]),
         )
@@ -134,6 +130,46 @@ class OneSided:
         """Split duals in the order of the rows of A into those of both parts."""
         upper, lower = np.maximum(y[self._above], 0.0), np.maximum(-y[self._below], 0.0)
         return y[self.equalities.rows], np.concatenate([upper, lower])
+
+
+class BoundsApart:
+    """min 1/2 x'Px + q'x  s.t.  l <= A x <= u,  bounds on x: rows of one entry are the bounds.
+
+    Parameters
+    ----------
+    structure : pattern of the QP
+
+    Attributes
+    ----------
+    rows : those of several entries
+    """
+
+    def __init__(self, structure: QpStructure) -> None:
+        position = structure.positions().tocsr()
+        entries = np.diff(position.indptr)
+        self._single = np.flatnonzero(entries == 1)
+        self.rows = PickedRows(structure, np.flatnonzero(entries > 1))
+        single = position[self._single]
+        self._variable, self._from = single.indices, (single.data - 1.0).astype(np.intp)
+
+    def row_bounds(self, data: QpData) -> tuple[Floats, Floats]:
+        """Return l and u."""
+        return data.lower[self.rows.rows], data.upper[self.rows.rows]
+
+    def bounds(self, data: QpData) -> tuple[Floats, Floats]:
+        """Return the bounds on x, those of rows with a negative entry the other way round."""
+        factor = data.a_data[self._from]
+        one, other = data.lower[self._single] / factor, data.upper[self._single] / factor
+        low, high = np.full_like(data.q, -np.inf), np.full_like(data.q, np.inf)
+        low[self._variable], high[self._variable] = np.minimum(one, other), np.maximum(one, other)
+        return low, high
+
+    def join(self, data: QpData, rows: Floats, bounds: Floats) -> Floats:
+        """Put the duals of rows and bounds into the order of the rows of A."""
+        y = np.empty_like(data.lower)
+        y[self.rows.rows] = rows
+        y[self._single] = bounds[self._variable] / data.a_data[self._from]
+        return y
 
 
 def _masks(data: QpData) -> tuple[Mask, Mask, Mask]:

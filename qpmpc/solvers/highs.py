@@ -31,6 +31,7 @@ class Highs(TimedSolver):
 
     name = "highs"
     package = "highspy"
+    max_iterations = ITERATION_LIMIT
 
     def _start(self, structure: QpStructure, data: QpData) -> None:
         self._pattern = structure
@@ -41,7 +42,7 @@ class Highs(TimedSolver):
             "threads": 1,
             "primal_feasibility_tolerance": tolerance,
             "dual_feasibility_tolerance": tolerance,
-            "qp_iteration_limit": ITERATION_LIMIT,
+            "qp_iteration_limit": self.limit,
             "qp_regularization_value": REGULARISATION,
         }
         for key, value in options.items():
@@ -72,10 +73,14 @@ class Highs(TimedSolver):
         self._solver.passModel(model)
 
     def _run(self, data: QpData, primal: Floats | None, dual: Floats | None) -> Outcome:
+        before = self._solver.getRunTime()
         self._solver.run()
+        own_s = self._solver.getRunTime() - before
         status = _STATUS.get(self._solver.getModelStatus().name, Status.FAILED)
         iterations = max(int(self._solver.getInfo().qp_iteration_count), 0)
         solution = self._solver.getSolution()
         if not solution.value_valid:
-            return Outcome(*nothing(data), status, iterations)
-        return Outcome(array(solution.col_value), -array(solution.row_dual), status, iterations)
+            return Outcome(*nothing(data), status, iterations, own_s)
+        return Outcome(
+            array(solution.col_value), -array(solution.row_dual), status, iterations, own_s
+        )

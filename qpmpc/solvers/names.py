@@ -10,8 +10,18 @@ _THROUGH = "qpsolvers:"
 SOLVERS = Names(
     "solver",
     {
-        name: Shipped(f"qpmpc.solvers.{name}:{name.capitalize()}")
-        for name in ("osqp", "piqp", "clarabel", "daqp", "qoco", "highs", "proxqp", "scs")
+        "osqp": Shipped("qpmpc.solvers.osqp:Osqp"),
+        "piqp": Shipped("qpmpc.solvers.piqp:Piqp"),
+        "piqp-multistage": Shipped("qpmpc.solvers.piqp:PiqpMultistage"),
+        "clarabel": Shipped("qpmpc.solvers.clarabel:Clarabel"),
+        "hpipm": Shipped("qpmpc.solvers.hpipm:Hpipm"),
+        "daqp": Shipped("qpmpc.solvers.daqp:Daqp"),
+        "qoco": Shipped("qpmpc.solvers.qoco:Qoco"),
+        "qpalm": Shipped("qpmpc.solvers.qpalm:Qpalm"),
+        "highs": Shipped("qpmpc.solvers.highs:Highs"),
+        "proxqp": Shipped("qpmpc.solvers.proxqp:Proxqp"),
+        "scs": Shipped("qpmpc.solvers.scs:Scs"),
+        "qpoases": Shipped("qpmpc.solvers.qpoases:Qpoases"),
     },
     also=f", or {_THROUGH}NAME",
 )
@@ -22,7 +32,9 @@ def solver_names() -> tuple[str, ...]:
     return tuple(SOLVERS.shipped)
 
 
-def make_solver(name: str, tolerance: float = DEFAULT_TOLERANCE) -> QpSolver:
+def make_solver(
+    name: str, tolerance: float = DEFAULT_TOLERANCE, iterations: int | None = None
+) -> QpSolver:
     """Make a backend.
 
     Parameters
@@ -30,16 +42,20 @@ def make_solver(name: str, tolerance: float = DEFAULT_TOLERANCE) -> QpSolver:
     name : one of `SOLVERS`, or ``qpsolvers:NAME`` for any solver that qpsolvers finds
     tolerance : of the shipped backends, on the KKT residuals; OSQP runs a fixed number of
         iterations instead (`AdmmSettings`)
+    iterations : of the shipped backends other than OSQP, at most; their own limit if None
 
     Raises
     ------
     InputError
-        If the name is unknown, its package is not installed, or the tolerance is out of range.
+        If the name is unknown, its package is not installed, or a number is out of range.
     """
     if name.startswith(_THROUGH):
         return _through_qpsolvers(name.removeprefix(_THROUGH), tolerance)
     backend = SOLVERS.find(name)
-    made: QpSolver = backend() if name == "osqp" or name in SOLVERS.added else backend(tolerance)
+    if name == "osqp" or name in SOLVERS.added:
+        made: QpSolver = backend()
+    else:
+        made = backend(tolerance, iterations)
     return made
 
 

@@ -91,6 +91,7 @@ class Osqp:
             iterations=int(result.info.iter),
             solve_s=done - updated,
             update_s=updated - start,
+            own_s=float(result.info.solve_time),
         )
 
     def _set_iterations(self, count: int) -> None:

@@ -21,12 +21,16 @@ class Piqp(TimedSolver):
 
     name = "piqp"
     package = "piqp"
+    max_iterations = 250
+    kkt_solver = "sparse_ldlt"
 
     def _start(self, structure: QpStructure, data: QpData) -> None:
         self._form = TwoSided(structure, data)
         self._solver: Any = self.module.SparseSolver()
         settings = self._solver.settings
         settings.eps_abs = settings.eps_duality_gap_abs = self.tolerance
+        settings.max_iter, settings.compute_timings = self.limit, True
+        settings.kkt_solver = getattr(self.module.KKTSolver, self.kkt_solver)
         settings.eps_rel = settings.eps_duality_gap_rel = 0.0
         self._solver.setup(**self._values(data))
 
@@ -56,4 +60,12 @@ class Piqp(TimedSolver):
             self._form.join(array(result.y), array(result.z_u) - array(result.z_l)),
             _STATUS.get(status.name, Status.FAILED),
             int(result.info.iter),
+            float(result.info.solve_time),
         )
+
+
+class PiqpMultistage(Piqp):
+    """The same with PIQP's backend for multistage problems, which finds the stages by itself."""
+
+    name = "piqp-multistage"
+    kkt_solver = "sparse_multistage"

@@ -21,7 +21,7 @@ _STATUS = {
     "PROXQP_PRIMAL_INFEASIBLE": Status.INFEASIBLE,
     "PROXQP_DUAL_INFEASIBLE": Status.INFEASIBLE,
 }
-OUTER_LIMIT, INNER_LIMIT = 100, 300
+INNER_LIMIT = 300
 
 
 class Proxqp(TimedSolver):
@@ -33,6 +33,7 @@ class Proxqp(TimedSolver):
 
     name = "proxqp"
     package = "proxsuite"
+    max_iterations = 100  # outer ones
 
     def _start(self, structure: QpStructure, data: QpData) -> None:
         self._pattern = structure
@@ -43,8 +44,9 @@ class Proxqp(TimedSolver):
             structure.shape[1], len(equalities), len(inequalities)
         )
         settings = self._solver.settings
+        settings.compute_timings = True
         settings.eps_abs, settings.eps_rel = self.tolerance, 0.0
-        settings.max_iter, settings.max_iter_in = OUTER_LIMIT, INNER_LIMIT
+        settings.max_iter, settings.max_iter_in = self.limit, INNER_LIMIT
         self._solver.init(**self._values(data))
 
     def _fits(self, data: QpData) -> bool:
@@ -75,11 +77,16 @@ class Proxqp(TimedSolver):
             self._solver.solve(primal, *self._form.part(dual))
         result = self._solver.results
         status = _STATUS.get(result.info.status.name, Status.FAILED)
-        if status is Status.ITERATION_LIMIT and is_infeasible(self._pattern, data):
+        if (
+            status is Status.ITERATION_LIMIT
+            and not self.capped
+            and is_infeasible(self._pattern, data)
+        ):
             status = Status.INFEASIBLE
         return Outcome(
             array(result.x),
             self._form.join(array(result.y), array(result.z)),
             status,
             int(result.info.iter),
+            1e-6 * float(result.info.solve_time),
         )

@@ -25,6 +25,7 @@ class Qoco(TimedSolver):
 
     name = "qoco"
     package = "qoco"
+    max_iterations = 200
 
     def _start(self, structure: QpStructure, data: QpData) -> None:
         self._pattern = structure
@@ -45,6 +46,7 @@ class Qoco(TimedSolver):
             l=len(inequalities.rows),
             nsoc=0,
             q=None,
+            max_iters=self.limit,
             abstol=self.tolerance,
             reltol=self.tolerance,
         )
@@ -64,11 +66,12 @@ class Qoco(TimedSolver):
     def _run(self, data: QpData, primal: Floats | None, dual: Floats | None) -> Outcome:
         result = self._solver.solve()
         status = _STATUS.get(result.status, Status.FAILED)
-        if status is not Status.SOLVED and is_infeasible(self._pattern, data):
+        if status is not Status.SOLVED and not self.capped and is_infeasible(self._pattern, data):
             status = Status.INFEASIBLE
         return Outcome(
             array(result.x),
             self._form.join(array(result.y), array(result.z)),
             status,
             int(result.iters),
+            float(result.solve_time_sec),
         )

@@ -25,6 +25,7 @@ class Scs(TimedSolver):
 
     name = "scs"
     package = "scs"
+    max_iterations = 100_000
 
     def _start(self, structure: QpStructure, data: QpData) -> None:
         self._form = OneSided(structure, data)
@@ -40,6 +41,7 @@ class Scs(TimedSolver):
         self._solver: Any = self.module.SCS(
             {"P": hessian_matrix(data), "A": self._a, "b": self._b, "c": data.q},
             {"z": len(equalities), "l": len(inequalities)},
+            max_iters=self.limit,
             eps_abs=self.tolerance,
             eps_rel=0.0,
             verbose=False,
@@ -59,4 +61,5 @@ class Scs(TimedSolver):
             self._form.join(found[:equalities], found[equalities:]),
             _STATUS.get(result["info"]["status"], Status.FAILED),
             int(result["info"]["iter"]),
+            1e-3 * float(result["info"]["solve_time"]),
         )

@@ -21,6 +21,7 @@ class ThroughQpsolvers(TimedSolver):
     """
 
     package = "qpsolvers"
+    max_iterations = 0  # each solver has its own
 
     def __init__(self, solver: str, tolerance: float = DEFAULT_TOLERANCE) -> None:
         self.name = f"qpsolvers:{solver}"

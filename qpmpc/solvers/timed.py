@@ -1,5 +1,6 @@
 """The base of all tolerance-driven backends: data update and solve, timed separately."""
 
+import math
 from abc import ABC, abstractmethod
 from importlib import import_module
 from time import perf_counter
@@ -18,12 +19,13 @@ EXTRA = "verification"  # the extra of qpmpc-iptm that installs these solvers
 
 
 class Outcome(NamedTuple):
-    """A backend's result of one solve."""
+    """A backend's result of one solve; `own_s` as of `QpSolution`."""
 
     primal: Floats
     dual: Floats
     status: Status
     iterations: int
+    own_s: float = math.nan
 
 
 class TimedSolver(ABC):
@@ -33,20 +35,33 @@ class TimedSolver(ABC):
     ----------
     tolerance : on primal and dual residual and duality gap, in solver units, as the solver
         measures them
+    iterations : at most, of the solver's own kind; its own limit if None
+
+    Attributes
+    ----------
+    max_iterations : that limit
+    limit : the one in force
+    capped : whether it is a given one; a result at such a limit is what was asked for
 
     Raises
     ------
     InputError
-        If the solver's package is not installed, or the tolerance is not in (0, 1).
+        If the solver's package is not installed, the tolerance is not in (0, 1), or there are
+        fewer iterations than one.
     """
 
     name: str
     package: str
+    max_iterations: int
 
-    def __init__(self, tolerance: float = DEFAULT_TOLERANCE) -> None:
+    def __init__(self, tolerance: float = DEFAULT_TOLERANCE, iterations: int | None = None) -> None:
         if not 0.0 < tolerance < 1.0:
             raise InputError(f"solver tolerance must be between 0 and 1 (given: {tolerance})")
+        if iterations is not None and iterations < 1:
+            raise InputError(f"solver iterations must be 1 or more (given: {iterations})")
         self.tolerance = tolerance
+        self.capped = iterations is not None
+        self.limit = self.max_iterations if iterations is None else iterations
         self.module = require(self.package, self.name)
         self._structure: QpStructure | None = None
 
@@ -78,6 +93,7 @@ class TimedSolver(ABC):
             iterations=outcome.iterations,
             solve_s=done - updated,
             update_s=updated - start,
+            own_s=outcome.own_s,
         )
 
     @abstractmethod

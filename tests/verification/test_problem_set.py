@@ -8,7 +8,7 @@ from qpmpc.solvers.feasibility import is_infeasible
 from qpmpc.solvers.osqp import Osqp
 from qpmpc.vehicle import load_vehicle
 from qpmpc.verification.benchmark.problem_set import Problem, problem_set
-from qpmpc.verification.checks.backend_checks import AGREE, CYCLING, LOOSE, TO_THE_END
+from qpmpc.verification.checks.backend_checks import AGREE, CYCLING, DENSE, LOOSE, TO_THE_END
 from qpmpc.verification.renderings.kkt import objective
 
 ACTIVE = 1e-6  # solver units
@@ -63,6 +63,8 @@ def test_degenerate_ones_are(problems) -> None:
 def test_backend(name: str, problems) -> None:
     # they take a second for each: the harder ones of the city are enough for them here
     slow = name in ("osqp", "proxqp", "scs")
+    if name in DENSE:
+        pytest.skip("a quarter of a minute for each; see tests/solvers/test_backends.py")
     hard = [p for p in problems if p.name.startswith("city") and p.kind != "ordinary"]
     chosen = hard if slow else problems
     loose = LOOSE.get(name, AGREE)
