@@ -62,7 +62,7 @@ class CasadiConic:
         for name in IN:
             index = self._function.index_in(name)
             self.values[name] = np.zeros(self._function.nnz_in(index))
-            self._buffer.set_arg(index, memoryview(self.values[name]))
+            self._buffer.set_arg(index, self.values[name].data)
         self.found = {
             name: np.zeros(self._function.nnz_out(self._function.index_out(name))) for name in OUT
         }
@@ -73,7 +73,7 @@ class CasadiConic:
         for name, value in values.items():
             self.values[name][:] = value
         for name, memory in self.found.items():  # a call forgets where its results go
-            self._buffer.set_res(self._function.index_out(name), memoryview(memory))
+            self._buffer.set_res(self._function.index_out(name), memory.data)
         self._call()
         stats: dict[str, Any] = self._buffer.stats()
         now = float(stats["t_wall_solver"])  # the sum over all calls

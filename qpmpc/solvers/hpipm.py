@@ -20,8 +20,9 @@ class Hpipm(TimedSolver):
     """Backend over CasADi's plugin `hpipm`, mode `speed`, which proved the quickest.
 
     Other equalities than dynamics are opened by the tolerance to either side: an interior point
-    needs an interior. A solution that rests on a bound put in place of infinity belongs to an unbounded problem. HPIPM
-    has no status for an infeasible one: if it finds no solution, a linear program decides.
+    needs an interior. A solution that rests on a bound put in place of infinity belongs to an
+    unbounded problem. HPIPM has no status for an infeasible one: if it finds no solution, a linear
+    program decides.
     """
 
     name = "hpipm"

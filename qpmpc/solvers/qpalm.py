@@ -19,10 +19,7 @@ _STATUS = {
 }
 NO_BOUND = 1e20  # QPALM's infinity
 NEWTON_STEPS = 20_000
-PENALTY = (
-    100.0  # first penalty of the rows; with the default of 20 it calls feasible QPs infeasible
-)
-CERTIFICATE = 1e-9  # on certificates of infeasibility, for the same reason
+CERTIFICATE = 1e-9  # with the default of 1e-5 it calls feasible QPs infeasible
 
 
 class Qpalm(TimedSolver):
@@ -45,7 +42,7 @@ class Qpalm(TimedSolver):
         settings = self.module.Settings()
         settings.eps_abs, settings.eps_rel = self.tolerance, 0.0
         settings.eps_prim_inf = settings.eps_dual_inf = CERTIFICATE
-        settings.sigma_init, settings.max_iter, settings.verbose = PENALTY, self.limit, 0
+        settings.max_iter, settings.verbose = self.limit, 0
         self._solver: Any = self.module.Solver(problem, settings)
 
     def _fits(self, data: QpData) -> bool:

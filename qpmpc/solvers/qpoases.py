@@ -1,7 +1,5 @@
 """qpOASES: parametric active set, dense, through CasADi's plugin; hot-started."""
 
-import numpy as np
-
 from qpmpc.qp.stage_qp import QpData
 from qpmpc.qp.structure import QpStructure
 from qpmpc.solvers.base import Floats, Status, nothing

@@ -248,7 +248,7 @@ def test_times_are_apart(name: str, of: Of) -> None:
     solver = make_solver(name)
     solver.setup(recording.structure, recording.solves[5].data)
     for qp in recording.solves[6:9]:
-        found = solver.solve(qp.data, None, None)
+        found = solver.solve(qp.data, qp.primal, qp.dual)
         assert found.solve_s > 0.0
         assert found.update_s > 0.0
         if name in WITHOUT_CLOCK:
