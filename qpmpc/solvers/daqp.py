@@ -31,6 +31,7 @@ class Daqp(TimedSolver):
     name = "daqp"
     package = "daqp"
     max_iterations = 10_000
+    starts_warm = True
 
     def _start(self, structure: QpStructure, data: QpData) -> None:
         self._pattern = structure

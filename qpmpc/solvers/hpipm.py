@@ -28,6 +28,7 @@ class Hpipm(TimedSolver):
     name = "hpipm"
     package = "casadi"
     max_iterations = ITERATIONS
+    starts_warm = True
 
     def _start(self, structure: QpStructure, data: QpData) -> None:
         check_plugin(self.module, self.name)

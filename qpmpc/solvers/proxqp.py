@@ -34,6 +34,7 @@ class Proxqp(TimedSolver):
     name = "proxqp"
     package = "proxsuite"
     max_iterations = 100  # outer ones
+    starts_warm = True
 
     def _start(self, structure: QpStructure, data: QpData) -> None:
         self._pattern = structure

@@ -32,6 +32,7 @@ class Qpalm(TimedSolver):
     name = "qpalm"
     package = "qpalm"
     max_iterations = NEWTON_STEPS
+    starts_warm = True
 
     def _start(self, structure: QpStructure, data: QpData) -> None:
         self._pattern = structure

@@ -23,6 +23,7 @@ class Qpoases(TimedSolver):
     name = "qpoases"
     package = "casadi"
     max_iterations = CHANGES
+    starts_warm = True
 
     def _start(self, structure: QpStructure, data: QpData) -> None:
         check_plugin(self.module, self.name)

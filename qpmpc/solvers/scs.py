@@ -26,6 +26,7 @@ class Scs(TimedSolver):
     name = "scs"
     package = "scs"
     max_iterations = 100_000
+    starts_warm = True
 
     def _start(self, structure: QpStructure, data: QpData) -> None:
         self._form = OneSided(structure, data)

@@ -40,6 +40,7 @@ class TimedSolver(ABC):
     Attributes
     ----------
     max_iterations : that limit
+    starts_warm : whether a start, or what is in memory, makes a difference
     limit : the one in force
     capped : whether it is a given one; a result at such a limit is what was asked for
 
@@ -53,6 +54,7 @@ class TimedSolver(ABC):
     name: str
     package: str
     max_iterations: int
+    starts_warm = False
 
     def __init__(self, tolerance: float = DEFAULT_TOLERANCE, iterations: int | None = None) -> None:
         if not 0.0 < tolerance < 1.0:

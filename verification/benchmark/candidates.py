@@ -1,14 +1,20 @@
-"""The candidates: generated C and OSQP at fixed iteration counts, and rivals at a tolerance."""
+"""The candidates: generated C and OSQP at fixed iteration counts, rivals, whole controllers."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 
 from qpmpc.codegen.c_compiler import compiler
-from qpmpc.solvers.names import solver_names
+from qpmpc.errors import InputError
+from qpmpc.names import unknown
+from qpmpc.problems import shown_value
+from qpmpc.registry import check_controllers, controller_names
+from qpmpc.solvers.names import make_solver, solver_names
 
 ITERATIONS = (10, 15, 25, 35, 50, 100, 200, 400)
 RHOS = (0.01, 0.03, 0.3, 1.0)
 RIVAL_TOLERANCE = 1e-5
+CONTROLLERS = "controllers"  # the family of those that drive as they are
 
 
 @dataclass(frozen=True)
@@ -24,6 +30,7 @@ class Candidate:
         None
     controller : name of the controller whose settings are used
     generated : whether it is the generated C controller, the default of `mh-qp`
+    whole : whether `controller` drives as it is, whatever it is
     """
 
     label: str
@@ -32,6 +39,7 @@ class Candidate:
     solver: str | None = None
     controller: str = "mh-qp"
     generated: bool = False
+    whole: bool = False
 
 
 def candidates() -> tuple[Candidate, ...]:
@@ -45,9 +53,9 @@ def candidates() -> tuple[Candidate, ...]:
     ]
     found += [
         Candidate(label, "osqp, other scaling", {"mh_qp.scaling.duration_exponent": exponent})
-        for label, exponent in (("osqp, plain rates", 0.0), ("osqp, energies", 1.0))
+        for label, exponent in (("osqp plain rates", 0.0), ("osqp energies", 1.0))
     ]
-    found.append(Candidate("osqp, paper's grid", "paper's grid", controller="mh-qp-paper"))
+    found.append(Candidate("osqp paper's grid", "paper's grid", controller="mh-qp-paper"))
     found += [_rival(name) for name in solver_names() if name != "osqp" and _installed(name)]
     return tuple(found)
 
@@ -61,8 +69,44 @@ def _rival(name: str) -> Candidate:
     return Candidate(name, "rivals", solver=name)
 
 
-_MODULES = {"proxqp": "proxsuite", "highs": "highspy"}
+_MODULES = {
+    "proxqp": "proxsuite",
+    "highs": "highspy",
+    "hpipm": "casadi",
+    "qpoases": "casadi",
+    "piqp-multistage": "piqp",
+}
 
 
 def _installed(name: str) -> bool:
     return find_spec(_MODULES.get(name, name)) is not None
+
+
+def missing() -> list[str]:
+    """Rivals that cannot run here, for lack of their package."""
+    return [name for name in solver_names() if not _installed(name)]
+
+
+def chosen_candidates(names: Sequence[str]) -> tuple[Candidate, ...]:
+    """Return candidates by their labels, and controllers by their names.
+
+    Raises
+    ------
+    InputError
+        If a name is neither, is given twice, or needs a package that is not installed.
+    """
+    of_label = {candidate.label: candidate for candidate in candidates()}
+    found: list[Candidate] = []
+    for name in names:
+        if name in [each.label for each in found]:
+            raise InputError(f"candidate {shown_value(name)} is named twice")
+        if name in of_label:
+            found.append(of_label[name])
+        elif name in controller_names():
+            check_controllers([name])
+            found.append(Candidate(name, CONTROLLERS, controller=name, whole=True))
+        elif name in solver_names():
+            make_solver(name)  # says which package it needs
+        else:
+            raise InputError(unknown("candidate", name, (*of_label, *controller_names())))
+    return tuple(found)
