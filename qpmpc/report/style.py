@@ -7,6 +7,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from qpmpc.shown import is_plain, shown
 
@@ -48,6 +49,18 @@ def tidy(axes: Axes) -> None:
     axes.tick_params(labelsize=8)
     axes.yaxis.label.set_fontsize(8.5)
     axes.xaxis.label.set_fontsize(8.5)
+
+
+def log_scale(axes: Axes, x: bool = False, y: bool = False) -> None:
+    """Make axes logarithmic, their decades written as plain numbers: powers would be formulas."""
+    for wanted, scale, axis in (
+        (x, axes.set_xscale, axes.xaxis),
+        (y, axes.set_yscale, axes.yaxis),
+    ):
+        if wanted:
+            scale("log")
+            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            axis.set_minor_formatter(NullFormatter())
 
 
 def as_plain_text(figure: Figure) -> None:

@@ -7,7 +7,19 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from qpmpc.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, png, tidy
+from qpmpc.report.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    log_scale,
+    png,
+    tidy,
+)
 
 COLORS = (BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, GREY)
 LEAST_ERROR_W, LEAST_ERROR_G = 1e-3, 1e-6  # drawn; below it nothing can be told apart
@@ -34,8 +46,7 @@ def draw_anytime(rows: Sequence[dict[str, Any]]) -> bytes:
                 errors = np.clip([row[key]["median"] for row in own], *bounds)
                 start = own[0]["start"]
                 axes.plot(times, errors, label=f"{name}, {start}", markersize=4, **style)
-        axes.set_xscale("log")
-        axes.set_yscale("log")
+        log_scale(axes, x=True, y=True)
         axes.set_xlabel("solve, ms (median over QPs, each the best of the repetitions)")
         axes.set_ylabel(f"median error: {label}")
         tidy(axes)
@@ -48,21 +59,21 @@ def draw_growth(rows: Sequence[dict[str, Any]]) -> bytes:
     figure = Figure(figsize=(8.4, 4.6), layout="constrained")
     axes = figure.subplots()
     stages = np.array([row["stages"] for row in rows], dtype=float)
-    for key, color, label in (
-        ("solve_ms", VERMILION, "osqp: data, factorisation, K iterations"),
-        ("update_ms", SKY, "data update in numpy"),
+    for key, line, label in (
+        ("solve_ms", "o-", "osqp: data, factorisation, K iterations"),
+        ("update_ms", "o--", "data update in numpy"),
     ):
-        axes.plot(stages, [row[key] for row in rows], "o-", color=color, label=label, linewidth=2)
+        times = [row[key] for row in rows]
+        axes.plot(stages, times, line, color=VERMILION, label=label, linewidth=2)
     names = dict.fromkeys(name for row in rows for name in row.get("rivals_ms", {}))
     for name, style in zip(names, _styles()):  # noqa: B905
-        times = [row.get("rivals_ms", {}).get(name) for row in rows]
-        shown = [(s, t) for s, t in zip(stages, times, strict=True) if t is not None]
+        found = [row.get("rivals_ms", {}).get(name) for row in rows]
+        shown = [(s, t) for s, t in zip(stages, found, strict=True) if t is not None]
         if shown:
             axes.plot(*zip(*shown, strict=True), label=f"{name}, cold", markersize=4, **style)
     last = rows[-1]["solve_ms"]
     axes.plot(stages, last * stages / stages[-1], color=GREY, linewidth=0.8, ls=":", label="linear")
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    log_scale(axes, x=True, y=True)
     axes.set_xlabel("stages")
     axes.set_ylabel("ms per step")
     tidy(axes)

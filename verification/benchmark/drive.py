@@ -45,6 +45,7 @@ class Drive:
         """Return the figures as plain data."""
         summary = self.run.summary()
         balanced = summary["fuel_soc_balanced_g"]
+        cycle_s = float(self.step_ms.min(axis=0).sum() / 1e3)
         return {
             "cycle": self.run.cycle,
             "candidate": self.candidate.label,
@@ -62,7 +63,7 @@ class Drive:
             "solve_time_ms": spread(self.solve_ms),
             "update_time_ms": spread(self.update_ms),
             "own_time_ms": spread(self.own_ms),
-            "cycle_time_s": float(self.step_ms.min(axis=0).sum() / 1e3),
+            "cycle_time_s": cycle_s if np.isfinite(cycle_s) else None,
         }
 
 

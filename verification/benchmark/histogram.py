@@ -5,7 +5,18 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from qpmpc.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILION, png, tidy
+from qpmpc.report.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    VERMILION,
+    log_scale,
+    png,
+    tidy,
+)
 from qpmpc.verification.benchmark.drive import Drive
 
 PAPER_STEP_MS = 670.0
@@ -31,8 +42,7 @@ def draw_histogram(drives: Sequence[Drive]) -> bytes:
     axes.annotate(
         "paper's NLP, mean", (PAPER_STEP_MS, axes.get_ylim()[1] * 0.6), fontsize=7, ha="right"
     )
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    log_scale(axes, x=True, y=True)
     axes.set_xlabel("time of a step, ms (whole decision)")
     axes.set_ylabel("steps")
     axes.legend(fontsize=7, frameon=False)

@@ -22,7 +22,8 @@ ENOUGH_S = 15.0  # for one row: fewer samples after that
 GOLDEN = 0.6180339887
 FIRST_ORDER = (10, 25, 50, 100, 200, 400, 1000)
 INTERIOR = (2, 4, 6, 8, 10, 12, 15, 20, 30)
-# Iterations at which a solver is stopped. HiGHS and qpOASES then return nothing.
+# Iterations at which a solver is stopped. HiGHS and qpOASES then return nothing, DAQP a point far
+# from feasible.
 CAPS = {
     "osqp": FIRST_ORDER,
     "piqp": INTERIOR,
@@ -30,7 +31,6 @@ CAPS = {
     "clarabel": INTERIOR,
     "qoco": INTERIOR,
     "hpipm": INTERIOR,
-    "daqp": (1, 2, 5, 10, 25, 50, 100),
     "qpalm": (5, 10, 20, 40, 80, 160),
     "proxqp": (1, 2, 4, 8, 16),
     "scs": FIRST_ORDER,
@@ -75,6 +75,8 @@ def stopped(samples: Sequence[Sample], name: str) -> list[dict[str, Any]]:
         timed = _solve(solver, samples, warm)
         start = "warm" if warm else "cold"
         rows.append({"solver": name, "start": start, "iterations": cap, **_figures(timed)})
+        if name != "osqp" and rows[-1]["solved"] == rows[-1]["qps"]:
+            break  # it ends before more
     return rows
 
 

@@ -5,10 +5,26 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backend_bases import RendererBase
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from qpmpc.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, png, tidy
+from qpmpc.report.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    log_scale,
+    png,
+    tidy,
+)
 from qpmpc.solvers.base import Floats
 from qpmpc.verification.benchmark.candidates import CONTROLLERS
 from qpmpc.verification.benchmark.pareto import Point, front, points
@@ -24,7 +40,8 @@ FAMILY_COLORS = {
 }
 SHOWN_ABOVE_DP_PERCENT = (0.01, 50.0)
 MARK = 10.0  # pixels that a mark takes
-SIDES = [(7, 0), (7, 9), (7, -9), (-7, 9), (-7, -9), (-7, 0), (10, 18), (10, -18), (-10, -18)]
+# of a name beside its point, pixels: the front goes on to the right and falls
+SIDES = ((6, 9), (-6, -9), (6, -9), (-6, 9), (12, 22), (-12, -22), (12, -22), (-12, 22))
 
 
 def draw_pareto(rows: Sequence[dict[str, Any]]) -> bytes:
@@ -44,8 +61,13 @@ def draw_pareto(rows: Sequence[dict[str, Any]]) -> bytes:
         "the Pareto front. Hollow: a limit violated, a fallback used, or not comparable",
         fontsize=9,
     )
-    figure.canvas.draw()
-    _label(plane, found, best)
+    families = [name for name in FAMILY_COLORS if name in {p.family for p in found}]
+    dots = [Line2D([], [], color=FAMILY_COLORS[f], marker="o", linestyle="none") for f in families]
+    figure.legend(dots, families, fontsize=8, frameon=False, ncols=7, loc="outside lower center")
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()  # type: ignore[no-untyped-call]
+    figure.set_layout_engine("none")  # names are placed where the points are now
+    _label(plane, found, best, canvas.get_renderer())  # type: ignore[no-untyped-call]
     return png(figure)
 
 
@@ -73,40 +95,27 @@ def _mark(point: Point, best: Sequence[Point]) -> dict[str, Any]:
 
 
 def _draw_plane(axes: Axes, found: Sequence[Point], best: Sequence[Point]) -> None:
-    named: set[str] = set()
     for point in found:
         if np.isnan(point.worst_ms):
             continue
         color, values = FAMILY_COLORS[point.family], _percent(point)
-        label = None if point.family in named else point.family
-        named.add(point.family)
-        axes.plot(point.worst_ms, np.median(values), label=label, **_mark(point, best))
+        axes.plot(point.worst_ms, np.median(values), **_mark(point, best))
         axes.vlines(point.worst_ms, values.min(), values.max(), color=color, linewidth=0.8)
     if best:
         worst = [p.worst_ms for p in best]
         height = [float(np.median(_percent(p))) for p in best]
         axes.step(worst, height, where="post", color=GREY, linewidth=1.0, zorder=1)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    log_scale(axes, x=True, y=True)
     axes.margins(x=0.12)
     axes.set_xlabel("worst step of all trips, ms (each step's best of the repetitions)")
     axes.set_ylabel("SOC-balanced fuel above DP, %: median and range over trips")
-    handles, labels = axes.get_legend_handles_labels()
-    axes.legend(
-        handles,
-        labels,
-        fontsize=7,
-        frameon=False,
-        ncols=2,
-        loc="lower center",
-        bbox_to_anchor=(0.5, 1.0),
-    )
     tidy(axes)
 
 
-def _label(axes: Axes, found: Sequence[Point], best: Sequence[Point]) -> None:
+def _label(
+    axes: Axes, found: Sequence[Point], best: Sequence[Point], renderer: RendererBase
+) -> None:
     """Name the points of the front, no name over another or over a point."""
-    renderer = axes.figure.canvas.get_renderer()  # type: ignore[attr-defined]
     frame = axes.get_window_extent(renderer)
     drawn = [p for p in found if np.isfinite(p.worst_ms)]
     places = np.array([(p.worst_ms, float(np.median(_percent(p)))) for p in drawn])
@@ -125,8 +134,11 @@ def _label(axes: Axes, found: Sequence[Point], best: Sequence[Point]) -> None:
                 ha="left" if side[0] > 0 else "right",
                 va="center",
                 arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.5, "shrinkB": 3},
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
+                zorder=4,
             )
-            box = text.get_window_extent(renderer)
+            text.update_positions(renderer)
+            box = Text.get_window_extent(text, renderer)  # without its line to the point
             inside = frame.x0 <= box.x0 and box.x1 <= frame.x1
             if inside and not any(box.overlaps(other) for other in taken):
                 taken.append(box)
@@ -140,7 +152,7 @@ def _draw_times(axes: Axes, found: Sequence[Point], best: Sequence[Point]) -> No
         axes.hlines(row, point.median_ms, point.worst_ms, color=color, linewidth=1.0)
         axes.plot(point.median_ms, row, marker="|", markersize=7, color=color)
         axes.plot(point.worst_ms, row, **_mark(point, best))
-    axes.set_xscale("log")
+    log_scale(axes, x=True)
     axes.set_yticks(range(len(found)), [point.label for point in found])
     axes.set_ylim(len(found) - 0.5, -0.5)
     axes.set_xlabel("step, ms: median (bar) and worst")
@@ -165,7 +177,7 @@ def _draw_fuel(axes: Axes, found: Sequence[Point]) -> None:
             alpha=0.7,
         )
         axes.plot(np.median(values), row, marker="|", markersize=10, color=color)
-    axes.set_xscale("log")
+    log_scale(axes, x=True)
     axes.set_xlabel(
         "fuel above DP, %: each trip, and their median (bar)\ndrawn within {:g} and {:g}".format(
             *SHOWN_ABOVE_DP_PERCENT

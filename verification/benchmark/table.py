@@ -40,7 +40,7 @@ def benchmark_table(rows: Sequence[dict[str, Any]]) -> ShownTable:
             *_shown(row["step_time_ms"], "median", "p99", "max"),
             *_shown(row["solve_time_ms"], "median", "max"),
             *_shown(row["own_time_ms"], "median", "max"),
-            f"{row['cycle_time_s']:.2f}",
+            "-" if row["cycle_time_s"] is None else f"{row['cycle_time_s']:.2f}",
             ", ".join(remarks),
         )
     return table
