@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
 from qpmpc.codegen.pil.loop import PilResult
-from qpmpc.report.style import BLACK, BLUE, GREY, ORANGE, SKY, VERMILION, png, tidy
+from qpmpc.report.style import BLACK, BLUE, GREY, ORANGE, SKY, VERMILION, log_scale, png, tidy
 
 LEAST_ERROR_W = 1e-3
 LINES = {
@@ -39,11 +39,12 @@ def draw_pil(result: PilResult) -> bytes:
     power.set_ylabel("engine power\nkW")
     power.legend(fontsize=8, frameon=False)
     shown_w = np.maximum(result.command_error_w, LEAST_ERROR_W)
-    error.semilogy(time_s, shown_w, ".", color=BLACK, markersize=3)
+    log_scale(error, y=True)
+    error.plot(time_s, shown_w, ".", color=BLACK, markersize=3)
     flips = result.flips
     if len(flips):
         label = "engine on in one, off in the other"
-        error.semilogy(flips, shown_w[flips], "o", color=VERMILION, markersize=5, label=label)
+        error.plot(flips, shown_w[flips], "o", color=VERMILION, markersize=5, label=label)
         error.legend(fontsize=8, frameon=False)
     error.set_ylabel(f"command error\nW (at least {LEAST_ERROR_W:g} shown)")
     error.set_xlabel("time, s")

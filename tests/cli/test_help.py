@@ -5,7 +5,7 @@ import pytest
 
 from qpmpc import __version__
 
-COMMANDS = ["simulate", "compare", "codegen", "pil", "cycles", "vehicles"]
+COMMANDS = ["simulate", "compare", "codegen", "pil", "benchmark", "cycles", "vehicles"]
 
 
 def test_version(cli):

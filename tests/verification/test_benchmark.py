@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.solvers import AdmmSettings
 from qpmpc.solvers.osqp import Osqp
@@ -16,9 +17,11 @@ from qpmpc.verification.benchmark.benchmark import Benchmark
 from qpmpc.verification.benchmark.candidates import Candidate, candidates
 from qpmpc.verification.benchmark.drive import drive
 from qpmpc.verification.benchmark.export import recorded_npz
+from qpmpc.verification.benchmark.on_samples import cold_and_warm, stopped
 from qpmpc.verification.benchmark.recorder import record
 from qpmpc.verification.benchmark.report import write_benchmark
-from qpmpc.verification.benchmark.table import benchmark_table
+from qpmpc.verification.benchmark.sampled import samples
+from qpmpc.verification.benchmark.table import benchmark_table, solvers_table
 
 VEHICLE = load_vehicle()
 
@@ -64,6 +67,22 @@ def test_generated_c_is_timed_and_burns_what_osqp_burns(short, driven):
     assert again.run.fuel_soc_balanced_g == pytest.approx(driven.run.fuel_soc_balanced_g, rel=1e-6)
 
 
+def test_a_whole_controller_drives_as_it_is(short):
+    trip = Trip(short, VEHICLE)
+    found = drive(Candidate("ecms", "controllers", controller="ecms", whole=True), trip, 1)
+    row = found.row(1.0)
+    assert row["step_time_ms"]["max"] > 0.0
+    assert row["solve_time_ms"] is row["own_time_ms"] is row["stages"] is None
+    assert found.run.controller == "ecms"
+
+
+def test_settings_reach_the_candidates(short):
+    settings = ControllerSettings().with_settings({"mh_qp.horizon.blocks": 2})
+    few = drive(Candidate("piqp", "rivals", solver="piqp"), Trip(short, VEHICLE), 1, settings)
+    assert few.stages == 20 + 3 * 2
+    assert few.row(1.0)["own_time_ms"]["max"] <= few.row(1.0)["solve_time_ms"]["max"]
+
+
 def test_exported_qps_are_the_controllers(short):
     recording = record(Trip(short, VEHICLE))
     with np.load(BytesIO(recorded_npz(recording))) as data:
@@ -86,15 +105,23 @@ def test_exported_qps_are_the_controllers(short):
         assert np.all(product >= data["lower"][k] - 0.1)
 
 
-def test_report_is_self_contained(driven, tmp_path):
+def test_report_is_self_contained(driven, short, tmp_path):
     growth = [{"stages": s, "update_ms": 0.1 * s, "solve_ms": 0.2 * s} for s in (5, 50)]
-    result = Benchmark([driven], [driven.row(5.0)], growth)
+    ecms = Candidate("ecms", "controllers", controller="ecms", whole=True)
+    rows = [driven.row(5.0), drive(ecms, Trip(short, VEHICLE), 1).row(5.0)]
+    sampled = samples(Trip(short, VEHICLE), ControllerSettings(), 1)
+    solvers, anytime = cold_and_warm(sampled, "hpipm"), stopped(sampled, "osqp")
+    result = Benchmark([driven], rows, growth, solvers, anytime, ["<qpalm>"])
     write_benchmark(result, VEHICLE, tmp_path)
     page = (tmp_path / "benchmark.html").read_text("utf-8")
     assert "http" not in page
     assert "osqp K=20" in page
-    for name in ("pareto", "histogram", "growth"):
+    for name in ("pareto", "histogram", "anytime", "growth"):
         assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     stored = json.loads((tmp_path / "benchmark.json").read_text("utf-8"))
     assert stored["runs"][0]["candidate"] == "osqp K=20"
-    assert benchmark_table(result.rows).row_count == 1
+    assert stored["solvers"][0]["solver"] == "hpipm"
+    assert stored["missing_rivals"] == ["<qpalm>"]
+    assert "&lt;qpalm&gt;" in page
+    assert benchmark_table(result.rows).row_count == 2
+    assert solvers_table(result.solvers).row_count == 2

@@ -14,7 +14,7 @@ from qpmpc.trip import Trip
 from qpmpc.verification.benchmark.candidates import RIVAL_TOLERANCE, Candidate, missing
 from qpmpc.verification.benchmark.drive import Drive, drive
 from qpmpc.verification.benchmark.growth import growth
-from qpmpc.verification.benchmark.on_samples import cold_and_warm, stopped
+from qpmpc.verification.benchmark.on_samples import cold_and_warm, generated, stopped
 from qpmpc.verification.benchmark.sampled import samples
 from qpmpc.verification.dynamic_programming import DpSettings, solve_dp
 from qpmpc.verification.dynamic_programming.controller import as_fraction
@@ -100,10 +100,12 @@ def benchmark(
     solved = in_order(partial(cold_and_warm, qps), rivals, report, count=1)
     report = next_job("solvers stopped early")
     early = in_order(partial(stopped, qps), ["osqp", *rivals], report, count=1)
+    anytime = [*chain(*early)]
+    ours = generated([row for row in rows if row["cycle"] == trips[0].cycle.name], anytime)
     report = next_job("growth over stages")
     grown = growth(trips[0].vehicle, settings.mh_qp, rivals)
     report(1, 1)
-    return Benchmark(drives, rows, grown, [*chain(*solved)], [*chain(*early)], missing())
+    return Benchmark(drives, rows, grown, [*chain(*solved)], [*ours, *anytime], missing())
 
 
 def _drive(trip: Trip, settings: ControllerSettings, candidate: Candidate) -> Drive:

@@ -14,6 +14,7 @@ from qpmpc.solvers.names import make_solver, solver_names
 ITERATIONS = (10, 15, 25, 35, 50, 100, 200, 400)
 RHOS = (0.01, 0.03, 0.3, 1.0)
 RIVAL_TOLERANCE = 1e-5
+GENERATED = "generated C, fixed K"
 CONTROLLERS = "controllers"  # the family of those that drive as they are
 
 
@@ -62,7 +63,7 @@ def candidates() -> tuple[Candidate, ...]:
 
 def _generated(k: int) -> Candidate:
     overrides: dict[str, object] = {"mh_qp.admm.iterations": k}
-    return Candidate(f"generated K={k}", "generated C, fixed K", overrides, generated=True)
+    return Candidate(f"generated K={k}", GENERATED, overrides, generated=True)
 
 
 def _rival(name: str) -> Candidate:

@@ -14,7 +14,7 @@ from qpmpc.solvers.names import SOLVERS, make_solver
 from qpmpc.solvers.osqp import Osqp
 from qpmpc.solvers.settings import AdmmSettings
 from qpmpc.solvers.timed import TimedSolver
-from qpmpc.verification.benchmark.candidates import RIVAL_TOLERANCE
+from qpmpc.verification.benchmark.candidates import GENERATED, RIVAL_TOLERANCE
 from qpmpc.verification.benchmark.sampled import Sample
 
 REPEATS = 5
@@ -77,6 +77,29 @@ def stopped(samples: Sequence[Sample], name: str) -> list[dict[str, Any]]:
         rows.append({"solver": name, "start": start, "iterations": cap, **_figures(timed)})
         if name != "osqp" and rows[-1]["solved"] == rows[-1]["qps"]:
             break  # it ends before more
+    return rows
+
+
+def generated(
+    runs: Sequence[dict[str, Any]], early: Sequence[dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """Return rows of generated C stopped at K, as far as they can be had.
+
+    It takes no QP from outside. Its times are those of its calls on a trip, data update and all the
+    rest of the controller included; its errors are OSQP's at the same K, whose arithmetic it has.
+
+    Parameters
+    ----------
+    runs : of one trip
+    early : rows of `stopped`
+    """
+    osqp = {row["iterations"]: row for row in early if row["solver"] == "osqp"}
+    rows = []
+    for run in runs:
+        k = run["iterations_max"]
+        if run["family"] == GENERATED and k in osqp:
+            times = {key: run[key] for key in ("solve_time_ms", "own_time_ms", "update_time_ms")}
+            rows.append({**osqp[k], "solver": "generated C", **times, "errors_of": "osqp"})
     return rows
 
 

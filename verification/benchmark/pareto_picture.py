@@ -26,11 +26,11 @@ from qpmpc.report.style import (
     tidy,
 )
 from qpmpc.solvers.base import Floats
-from qpmpc.verification.benchmark.candidates import CONTROLLERS
+from qpmpc.verification.benchmark.candidates import CONTROLLERS, GENERATED
 from qpmpc.verification.benchmark.pareto import Point, front, points
 
 FAMILY_COLORS = {
-    "generated C, fixed K": BLACK,
+    GENERATED: BLACK,
     "osqp, fixed K": VERMILION,
     "osqp, other rho": ORANGE,
     "osqp, other scaling": PURPLE,
@@ -46,6 +46,11 @@ SIDES = ((6, 9), (-6, -9), (6, -9), (-6, 9), (12, 22), (-12, -22), (12, -22), (-
 
 def draw_pareto(rows: Sequence[dict[str, Any]]) -> bytes:
     """Draw fuel above DP against the worst step, then both of each candidate; returns a PNG."""
+    return png(pareto_figure(rows))
+
+
+def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
+    """Return the figure of `draw_pareto`."""
     found = points(rows)
     best = front(found)
     trips = list(dict.fromkeys(row["cycle"] for row in rows))
@@ -68,7 +73,7 @@ def draw_pareto(rows: Sequence[dict[str, Any]]) -> bytes:
     canvas.draw()  # type: ignore[no-untyped-call]
     figure.set_layout_engine("none")  # names are placed where the points are now
     _label(plane, found, best, canvas.get_renderer())  # type: ignore[no-untyped-call]
-    return png(figure)
+    return figure
 
 
 def _listed(trips: Sequence[str]) -> str:

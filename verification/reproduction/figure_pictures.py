@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from qpmpc.report.style import BLACK, GREY, VERMILION, tidy
+from qpmpc.report.style import BLACK, GREY, VERMILION, log_scale, tidy
 from qpmpc.vehicle.engine import alpha
 from qpmpc.verification.reproduction import paper
 from qpmpc.verification.reproduction.drawing import WIDTH_IN, color
@@ -149,7 +149,7 @@ def _bars(study: Study, labels: list[str], name: str, title: str, caption: str) 
         span = max(max(fuels) - min(fuels), 0.02 * max(fuels))
         fuel_axes.set_ylim(min(fuels) - 0.5 * span, max(fuels) + 0.45 * span)
         fuel_axes.set_title(cycle, fontsize=10, fontweight="bold")
-        time_axes.set_yscale("log")
+        log_scale(time_axes, y=True)
         time_axes.set_ylim(1e-3, 1e4)
         for axes in (fuel_axes, time_axes):
             axes.set_xticks(range(len(labels)), shown)
