@@ -3,6 +3,7 @@
 import itertools
 from io import BytesIO
 
+import casadi
 import numpy as np
 import pytest
 from hypothesis import given
@@ -86,6 +87,11 @@ def test_front_is_what_nothing_beats(drawn: list[tuple[int, int, bool]]) -> None
             assert not beaten
         else:  # beaten, or a twin of one on the front
             assert beaten or any((q.worst_ms, q.fuel) == (p.worst_ms, p.fuel) for q in best)
+
+
+def test_rounding_makes_no_front() -> None:
+    rows = [row("quick", "nycc", 1.0, 0.1001), row("slow", "nycc", 2.0, 0.1)]
+    assert [p.label for p in front(points(rows))] == ["quick"]
 
 
 def test_worst_step_and_fuel_are_over_all_trips() -> None:
@@ -228,4 +234,6 @@ def test_candidates_by_label_and_controllers_by_name(monkeypatch: pytest.MonkeyP
         chosen_candidates(["hpipm", "hpipm"])
     monkeypatch.setattr(every, "find_spec", lambda name: None if name == "qpalm" else True)
     assert every.missing() == ["qpalm"]
+    monkeypatch.setattr(casadi, "has_conic", lambda plugin: plugin == "qpoases")
+    assert every.missing() == ["hpipm", "qpalm"]
     assert "qpalm" not in [c.label for c in every.candidates()]

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from importlib.util import find_spec
 
 from qpmpc.codegen.c_compiler import compiler
@@ -80,11 +81,14 @@ _MODULES = {
 
 
 def _installed(name: str) -> bool:
-    return find_spec(_MODULES.get(name, name)) is not None
+    module = _MODULES.get(name, name)
+    if find_spec(module) is None:
+        return False
+    return module != "casadi" or bool(import_module(module).has_conic(name))
 
 
 def missing() -> list[str]:
-    """Rivals that cannot run here, for lack of their package."""
+    """Rivals that cannot run here, for lack of their package or of CasADi's plugin."""
     return [name for name in solver_names() if not _installed(name)]
 
 

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+SAME_PERCENT = 0.005  # of fuel above DP: half the last digit of the tables
+
 
 @dataclass(frozen=True)
 class Point:
@@ -57,11 +59,11 @@ def is_sound(row: dict[str, Any]) -> bool:
 
 
 def front(found: Sequence[Point]) -> list[Point]:
-    """Sound candidates that none beats in both worst step and fuel, the quickest first."""
+    """Sound candidates that no quicker one equals in fuel to `SAME_PERCENT`, in order of time."""
     best = np.inf
     chosen = []
     for point in sorted(found, key=lambda p: (p.worst_ms, p.fuel)):
-        if point.sound and np.isfinite(point.worst_ms) and point.fuel < best:
+        if point.sound and np.isfinite(point.worst_ms) and point.fuel < best - SAME_PERCENT:
             chosen.append(point)
             best = point.fuel
     return chosen
