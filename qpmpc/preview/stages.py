@@ -10,10 +10,10 @@ from qpmpc.preview.forecast import Trace, internal_off_w
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.preview.place import forecast_seconds
 from qpmpc.preview.swing import NO_LIMIT_J, swings
-from qpmpc.vehicle.must_run import too_fast
+from qpmpc.vehicle.must_run import must_run, too_fast
 from qpmpc.vehicle.parameters import Vehicle
 
-FIELDS = 4  # of `Stages` that are means or sums of seconds
+FIELDS = 5  # of `Stages` that are means or sums of seconds
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,7 @@ class Stages:
     speed_mps : mean speed
     internal_off_w : mean of the internal battery power l(P0) with the engine off; by convexity
         more than l of the mean, which an averaged preview (one class) has to use
+    must_share : share of its seconds in which the engine must run (`qpmpc.vehicle.must_run`)
     rises : r_k, starts of the engine in the stage per on-share that it has more than the stage
         before: u_k >= r_k (sigma_k - sigma_k-1)
     fall_j, rise_j : energy that SOC keeps from its lower and its upper limit at the stage's end,
@@ -40,6 +41,7 @@ class Stages:
     net_w: NDArray[np.float64]
     speed_mps: NDArray[np.float64]
     internal_off_w: NDArray[np.float64]
+    must_share: NDArray[np.float64]
     rises: NDArray[np.float64]
     fall_j: NDArray[np.float64]
     rise_j: NDArray[np.float64]
@@ -146,7 +148,13 @@ class StageBuilder:
         trace = Trace(preview.short_demand_w[:seen], preview.short_speed_mps[:seen])
         fields[:, :seen] = _fields(trace, self._vehicle)
         long = preview.long
-        fields[:, n:] = (long.duration_s, long.net_w, long.speed_mps, long.internal_off_w)
+        fields[:, n:] = (
+            long.duration_s,
+            long.net_w,
+            long.speed_mps,
+            long.internal_off_w,
+            long.must_share,
+        )
         rises = np.zeros(self.count)
         rises[:seen] = 1.0
         rises[n:] = starts_per_rise(long.rises, self.settings)
@@ -175,6 +183,7 @@ class StageBuilder:
         fields[1:] /= np.maximum(fields[0], 1.0)
         if self.settings.classes == 1:  # an averaged preview has only the mean demand
             fields[3] = internal_off_w(self._vehicle, fields[1])
+            fields[4] = must_run(self._vehicle, fields[1], fields[2])
         return fields
 
     def shift(self) -> NDArray[np.intp]:
@@ -189,13 +198,15 @@ class StageBuilder:
 
 
 def _fields(trace: Trace, vehicle: Vehicle) -> NDArray[np.float64]:
-    """Duration, P0, speed and l(P0) of each 1 s step, in the order of `Stages`; (FIELDS, steps)."""
+    """Duration, P0, speed, l(P0) and must of each second, in the order of `Stages`."""
+    net_w = trace.battery_side_w(vehicle)
     return np.stack(
         [
             np.ones(trace.steps),
-            trace.battery_side_w(vehicle),
+            net_w,
             trace.speed_mps,
             trace.internal_off_w(vehicle),
+            must_run(vehicle, net_w, trace.speed_mps),
         ]
     )
 
@@ -211,7 +222,7 @@ def _demand_class(demand_w: NDArray[np.float64], settings: HorizonSettings) -> N
 def _cumulative(
     forecast: Trace, vehicle: Vehicle, demand_class: NDArray[np.intp], classes: int
 ) -> NDArray[np.float64]:
-    """Running sums over time of duration, P0, speed and l(P0), separately for each class.
+    """Running sums over time of the fields, separately for each class.
 
     Returns
     -------

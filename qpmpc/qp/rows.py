@@ -64,10 +64,9 @@ QUANTITIES = """
 # power limits of the engine while on; what the battery alone cannot give. Too fast for an engine
 # that is off: it must run, at its least power where the battery takes less
 room_w = net_w + battery_charge_max_w
-fast_room_w = where(speed_mps > electric_max_mps, max(room_w, engine_min_w), room_w)
+fast_room_w = where(must_share > 0.0, max(room_w, engine_min_w), room_w)
 most_w = min(engine_max_w, fast_room_w)
 missing_w = net_w - battery_discharge_max_w
-fast_share = where(speed_mps > electric_max_mps, SIGMA_FORCED, 0.0)
 
 # fuel above its curve would be heat without power: none where heat has to be had in good time
 waste_g_per_s = where(highest_floor_degc > t_min_degc, 0.0, MOOT_G_PER_S)
@@ -212,7 +211,7 @@ ROWS = (
     Row("p_eng_max", "p_eng - most_w * on <= 0.0"),
     Row("p_eng_min", "p_eng - engine_min_w * on >= max(missing_w - engine_min_w, 0.0)"),
     Row("box_soc", "soc_low <= soc <= soc_high"),
-    Row("box_on", "where(missing_w > 0.0, SIGMA_FORCED, fast_share) <= on <= 1.0"),
+    Row("box_on", "SIGMA_FORCED * must_share <= on <= 1.0"),
     Row("t_cl_min", "t_cl + t_slack >= floor_degc - origin_t_cl_degc"),
     Row("t_cl_max", "t_cl - t_slack <= t_max_degc - origin_t_cl_degc"),
     Row("box_slack", "t_slack >= 0.0"),

@@ -22,8 +22,8 @@ def _text() -> str:
 def test_shipped_vehicles_load_and_the_default_comes_first():
     assert vehicle_names() == (
         "prius-nimh",
-        "prius-liion",
         "prius-2016",
+        "prius-liion",
         "prius-prime",
         "sonata-hybrid",
         "paper-liion",
