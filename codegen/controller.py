@@ -49,6 +49,7 @@ class InputBuilder:
         into.long_net_w[:] = long.net_w.tolist()
         into.long_speed_mps[:] = long.speed_mps.tolist()
         into.long_internal_off_w[:] = long.internal_off_w.tolist()
+        into.long_must_share[:] = long.must_share.tolist()
         into.long_rises[:] = long.rises.tolist()
         into.long_fall_j[:] = long.fall_j.tolist()
         into.long_rise_j[:] = long.rise_j.tolist()

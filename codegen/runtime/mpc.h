@@ -38,7 +38,8 @@ typedef struct {
     /* statistics of the trip beyond, block by block, in each block class by class (hard driving,
      * easy driving, braking): seconds, mean of the net power P0 = demand + auxiliaries (each
      * second clipped at the battery's charge limit before the mean is taken), mean speed, mean of
-     * the internal battery power l(P0) with the engine off; and how often the demand rises into
+     * the internal battery power l(P0) with the engine off, share of the seconds in which the engine
+     * must run (P0 beyond the battery's limit, or too fast for an engine that is off); and how often the demand rises into
      * that class or past it, which matters where starts of the engine cost something (0 if it is not
      * known: they are then counted over the short horizon alone). 0 seconds where nothing is left.
      * mpc_forecast.h makes the preview from demand and speed of the trip. */
@@ -46,6 +47,7 @@ typedef struct {
     mpc_real long_net_w[MPC_LONG];
     mpc_real long_speed_mps[MPC_LONG];
     mpc_real long_internal_off_w[MPC_LONG];
+    mpc_real long_must_share[MPC_LONG];
     mpc_real long_rises[MPC_LONG];
     /* of the last class of each block, the others are not read: energy, J, by which SOC at the end of
      * the block stays off its lower and its upper limit, because it swings inside the block and the
@@ -108,7 +110,7 @@ void mpc_plan(const mpc_state *state, mpc_real *x, mpc_real *duals);
 /* Layout of this build, for callers in other languages to check theirs: version of this
  * interface, sizeof mpc_real, mpc_in, mpc_out, mpc_state, then MPC_SHORT, MPC_LONG, MPC_VARS,
  * MPC_ROWS, MPC_ITERATIONS, offset of mpc_in.short_count, of mpc_out.engine_on. */
-#define MPC_ABI_VERSION 4
+#define MPC_ABI_VERSION 5
 #define MPC_ABI_ENTRIES 12
 int32_t mpc_abi(int32_t entry);
 

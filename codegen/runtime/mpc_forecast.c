@@ -12,6 +12,7 @@
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
+#include "mpc_must_run.h"
 
 static void add_to(mpc_sum *to, mpc_real value)
 {
@@ -54,6 +55,7 @@ static void count(mpc_forecast *forecast, int32_t second, int32_t times)
         block[i].rises += times;
     }
     to->seconds += times;
+    to->musts += times * must_run(net_w, forecast->trip.speed_mps[second]);
     add_to(&to->net_w, sign * net_w);
     add_to(&to->speed_mps, sign * forecast->trip.speed_mps[second]);
     add_to(&to->internal_off_w, sign * mpc_map_planned_internal_w(net_w));
@@ -62,7 +64,7 @@ static void count(mpc_forecast *forecast, int32_t second, int32_t times)
 static void sum_up(mpc_forecast *forecast)
 {
     static const mpc_class_sums none = {
-        0, 0, {REAL(0.0), REAL(0.0)}, {REAL(0.0), REAL(0.0)}, {REAL(0.0), REAL(0.0)}};
+        0, 0, 0, {REAL(0.0), REAL(0.0)}, {REAL(0.0), REAL(0.0)}, {REAL(0.0), REAL(0.0)}};
     for (int32_t k = 0; k < MPC_LONG; k++) {
         forecast->ahead[k] = none;
     }
@@ -218,7 +220,9 @@ static void fill_long(const mpc_forecast *forecast, int32_t is_arriving, mpc_in 
         /* with one class the preview is averaged: it has only the mean demand */
 #if MPC_CLASSES > 1
         in->long_internal_off_w[k] = share * mean_of(&of->internal_off_w, seconds);
+        in->long_must_share[k] = share * ((mpc_real)of->musts / seconds);
 #else
+        in->long_must_share[k] = (mpc_real)must_run(in->long_net_w[k], in->long_speed_mps[k]);
         in->long_internal_off_w[k] = mpc_map_planned_internal_w(in->long_net_w[k]);
 #endif
     }

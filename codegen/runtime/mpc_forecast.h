@@ -39,6 +39,7 @@ typedef struct {
 typedef struct {
     int32_t seconds;
     int32_t rises; /* of the demand into it or past it */
+    int32_t musts; /* of its seconds those in which the engine must run */
     mpc_sum net_w;
     mpc_sum speed_mps;
     mpc_sum internal_off_w;

@@ -22,8 +22,7 @@ void mpc_learned_take(mpc_state *state)
     const mpc_real p_eng_w = good->p_eng_before_w;
     if ((good->engine_on != 0) && (p_eng_w < mpc_par.engine_max_w)) {
         const mpc_real start_g = (good->engine_for_s == 1) ? mpc_par.start_fuel_g : REAL(0.0);
-        const mpc_real map_g =
-            mpc_map_cold_factor(good->t_cl_degc) * mpc_map_fuel_g_per_s(p_eng_w);
+        const mpc_real map_g = mpc_map_cold_factor(good->t_cl_degc) * mpc_map_fuel_g_per_s(p_eng_w);
         const mpc_real ratio = (good->fuel_g - start_g) / map_g;
         if (within(ratio, RATIO_LEAST, RATIO_MOST) != 0) {
             const mpc_real p = place(p_eng_w);
@@ -49,10 +48,9 @@ void mpc_learned_curve(mpc_state *state)
     const mpc_real c = of->pp + PRIOR_S;
     const mpc_real r = of->r + PRIOR_S;
     const mpc_real divisor = real_max((a * c) - (of->p * of->p), PRIOR_S * PRIOR_S);
-    const mpc_real level = real_clip(((c * r) - (of->p * of->rp)) / divisor,
-                                     REAL(1.0) - LEVEL_MOST, REAL(1.0) + LEVEL_MOST);
-    const mpc_real tilt =
-        real_clip(((a * of->rp) - (of->p * r)) / divisor, -TILT_MOST, TILT_MOST);
+    const mpc_real level = real_clip(((c * r) - (of->p * of->rp)) / divisor, REAL(1.0) - LEVEL_MOST,
+                                     REAL(1.0) + LEVEL_MOST);
+    const mpc_real tilt = real_clip(((a * of->rp) - (of->p * r)) / divisor, -TILT_MOST, TILT_MOST);
     mpc_real fuel[MPC_FUEL_PIECES + 1];
     for (int32_t k = 0; k <= MPC_FUEL_PIECES; k++) {
         const mpc_real factor = level + (tilt * place(mpc_par.learned_power_w[k]));

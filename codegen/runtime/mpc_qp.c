@@ -12,6 +12,7 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 #include "mpc_rows_values.h"
+#include "mpc_must_run.h"
 
 /* Preview to stages: seconds first, then the classes of each block; past stages are masked. */
 void mpc_qp_road(mpc_state *state, const mpc_in *in)
@@ -23,6 +24,7 @@ void mpc_qp_road(mpc_state *state, const mpc_in *in)
         stage->road.net_w = (seen != 0) ? battery_side_w(in->short_demand_w[k]) : REAL(0.0);
         stage->road.speed_mps = (seen != 0) ? in->short_speed_mps[k] : REAL(0.0);
         stage->road.internal_off_w = mpc_map_planned_internal_w(stage->road.net_w);
+        stage->road.must_share = (mpc_real)must_run(stage->road.net_w, stage->road.speed_mps);
         stage->road.rises = (seen != 0) ? REAL(1.0) : REAL(0.0);
         stage->road.fall_j = REAL(0.0);
         stage->road.rise_j = REAL(0.0);
@@ -33,6 +35,7 @@ void mpc_qp_road(mpc_state *state, const mpc_in *in)
         stage->road.net_w = in->long_net_w[k];
         stage->road.speed_mps = in->long_speed_mps[k];
         stage->road.internal_off_w = in->long_internal_off_w[k];
+        stage->road.must_share = in->long_must_share[k];
         /* what rises into a class, falls from it to the next stage, the class below */
         stage->road.rises = ((k % MPC_CLASSES) > 0) ? (-mpc_par.rise_share * in->long_rises[k - 1])
                                                     : REAL(0.0);
@@ -56,6 +59,7 @@ void mpc_qp_road_move_up(mpc_state *state, int32_t by)
         road->net_w = seen * later->net_w;
         road->speed_mps = seen * later->speed_mps;
         road->internal_off_w = seen * later->internal_off_w;
+        road->must_share = seen * later->must_share;
         road->rises = seen * later->rises;
         road->fall_j = REAL(0.0);
         road->rise_j = REAL(0.0);

@@ -11,7 +11,7 @@
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
-#include "mpc_too_fast.h"
+#include "mpc_must_run.h"
 
 /* Mean on-share over that many seconds of the plan from `first` on, or over all that are left. */
 static mpc_real mean_share(const mpc_state *state, int32_t first, int32_t seconds)

@@ -2,7 +2,7 @@
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
-#include "mpc_too_fast.h"
+#include "mpc_must_run.h"
 
 mpc_command mpc_rules_decide(mpc_rule_memory *memory, const mpc_measured *seen)
 {
@@ -12,7 +12,7 @@ mpc_command mpc_rules_decide(mpc_rule_memory *memory, const mpc_measured *seen)
     const int32_t too_short = (seen->engine_for_s < mpc_par.rule_min_on_s) ? 1 : 0;
     const int32_t is_held = seen->engine_on & too_short;
     if ((requested_w > mpc_par.rule_on_w) || (seen->soc < mpc_par.rule_soc_forced)
-        || (net_w > mpc_par.battery_discharge_max_w) || (is_too_fast(seen->speed_mps) != 0)) {
+        || (must_run(net_w, seen->speed_mps) != 0)) {
         memory->power_request = 1;
     } else if ((requested_w < mpc_par.rule_off_w) && (is_held == 0)) {
         memory->power_request = 0;

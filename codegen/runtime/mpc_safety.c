@@ -11,7 +11,7 @@
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
-#include "mpc_too_fast.h"
+#include "mpc_must_run.h"
 
 #define LIMITS 3
 #define NEVER_W REAL(1.0e9)

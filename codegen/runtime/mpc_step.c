@@ -6,7 +6,7 @@
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
-#include "mpc_too_fast.h"
+#include "mpc_must_run.h"
 
 /* Apart from mpc_init, which nothing in this file may call alone (MISRA C:2012 8.7). */
 static void set_defined(mpc_state *state)

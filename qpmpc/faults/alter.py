@@ -8,7 +8,7 @@ import numpy as np
 from qpmpc.faults.models import Fault
 from qpmpc.preview.stages import Preview, Stages
 
-WILD_W, WILD_MPS, WILD_S, WILD_J = 1e6, 300.0, 1e4, 1e9
+WILD_W, WILD_MPS, WILD_SHARE, WILD_S, WILD_J = 1e6, 300.0, 9.0, 1e4, 1e9
 
 
 def altered_signal(fault: Fault, second: int, history: list[Any]) -> Any:
@@ -73,6 +73,7 @@ def _wild(now: Preview, second: int) -> Preview:
             rng.uniform(-WILD_W, WILD_W, long),
             rng.uniform(0.0, WILD_MPS, long),
             rng.uniform(-WILD_W, WILD_W, long),
+            rng.uniform(0.0, WILD_SHARE, long),
             rng.uniform(0.0, WILD_S, long),
             rng.uniform(0.0, WILD_J, long),
             rng.uniform(0.0, WILD_J, long),

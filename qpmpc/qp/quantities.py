@@ -23,7 +23,16 @@ from qpmpc.vehicle.parameters import Vehicle
 Floats = NDArray[np.float64]
 
 # Changing from step to step: a stage, the point it is expanded about, the state now.
-STAGE = ("duration_s", "net_w", "speed_mps", "internal_off_w", "must_share", "rises", "fall_j", "rise_j")
+STAGE = (
+    "duration_s",
+    "net_w",
+    "speed_mps",
+    "internal_off_w",
+    "must_share",
+    "rises",
+    "fall_j",
+    "rise_j",
+)
 ABOUT = ("t_cl_degc", "fuel_g_per_s", "p_eng_w", "t_cl_start_degc", "t_cl_end_degc")
 FLOOR = ("floor_degc", "highest_floor_degc")
 INPUTS = (*STAGE, *(f"about_{name}" for name in ABOUT), "start_soc", "on_now", *FLOOR)

@@ -18,6 +18,7 @@ from qpmpc.qp.rows import COST, ROWS, VARIABLES, Entry, Row, Rows, Table, table_
 from qpmpc.qp.rows import QUANTITIES as LINES
 from qpmpc.qp.stage_qp import qp_parameters
 from qpmpc.vehicle import load_vehicle
+from qpmpc.vehicle.must_run import must_run
 from qpmpc.verification.independent.equations import Equations
 
 CAR = load_vehicle("paper-nimh")  # its starts cost nothing
@@ -46,7 +47,14 @@ def two_stages(h, net_w, speed_mps, t_degc, fuel, power):
     pair = np.ones(2)
     off_w = EQUATIONS.internal_w(CAR.trip.soc_init, net_w)
     stages = Stages(
-        h * pair, net_w * pair, speed_mps * pair, float(off_w) * pair, pair, 0.0 * pair, 0.0 * pair
+        h * pair,
+        net_w * pair,
+        speed_mps * pair,
+        float(off_w) * pair,
+        must_run(CAR, net_w, speed_mps) * pair,
+        pair,
+        0.0 * pair,
+        0.0 * pair,
     )
     at = t_degc * pair
     return stages, Linearisation(at, fuel * pair, power * pair, at, at)

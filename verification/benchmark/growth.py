@@ -16,6 +16,7 @@ from qpmpc.solvers.base import Status
 from qpmpc.solvers.names import make_solver
 from qpmpc.solvers.osqp import Osqp
 from qpmpc.trip import Trip
+from qpmpc.vehicle.must_run import must_run
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.verification.benchmark.candidates import RIVAL_TOLERANCE
 
@@ -46,7 +47,8 @@ def growth(
     for count in STAGES:
         at = np.arange(count) % trace.steps
         each = np.ones(count)
-        stages = Stages(each, net[at], speed[at], off[at], each, 0.0 * each, 0.0 * each)
+        must = must_run(vehicle, net[at], speed[at]).astype(float)
+        stages = Stages(each, net[at], speed[at], off[at], must, each, 0.0 * each, 0.0 * each)
         about = Linearisation.constant(count, 60.0)
         qp = StageQp(vehicle, model, count, settings.qp, settings.scaling)
         solver = Osqp(settings.admm)

@@ -48,13 +48,14 @@ def stages_agree(context: Context) -> Iterator[Check]:
                 (ours.net_w, theirs.net_w),
                 (ours.speed_mps, theirs.speed_mps),
                 (ours.internal_off_w, theirs.off_w),
+                (ours.must_share, theirs.must),
                 (ours.rises, theirs.rises),
             )
             for a, b in pairs:
                 worst = max(worst, float(np.max(np.abs(a - b)) / max(np.abs(b).max(), 1.0)))
         yield Check(
             f"Stages of the horizon, {loop.name}",
-            "Durations, P0, speeds, l(P0) and rises are those of the seconds that they represent.",
+            "Durations, P0, speeds, l(P0), must and rises are those of their seconds.",
             1e-9,
             worst,
             "relative",

@@ -27,7 +27,8 @@ SOC, T_CL, P_ENG, ON, FUEL, INTERNAL, T_SLACK, START = range(8)
 class Horizon:
     """Duration (s), P0 (W), mean speed (m/s) and mean l(P0) (W) of each stage; shape (n,).
 
-    `rises`: starts in the stage for an on-share that is one more than that of the stage before.
+    `must`: share of the seconds with the engine on in any case. `rises`: starts in the stage for
+    an on-share that is one more than that of the stage before.
     `low_j`, `high_j`: energy to keep from the SOC limits, -inf where there is none.
     """
 
@@ -35,6 +36,7 @@ class Horizon:
     net_w: Floats
     speed_mps: Floats
     off_w: Floats
+    must: Floats
     rises: Floats
     low_j: Floats
     high_j: Floats
@@ -52,11 +54,13 @@ def horizon(cycle: Cycle, vehicle: Vehicle, settings: MhQpSettings, step: int) -
     speed = 0.5 * (cycle.speed_mps[:-1] + cycle.speed_mps[1:])
     give = np.minimum(net, equations.discharge_max_w)
     off = equations.internal_w(_mean_soc(vehicle), give)
+    must = (net > equations.discharge_max_w) | (speed - vehicle.engine.electric_max_mps >= 1e-5)
     steps = cycle.steps
     n, length = grid.short_stages, -(-steps // grid.blocks)
     rows: list[list[float]] = []
     for t in range(step, step + n):
-        rows.append([1.0, net[t], speed[t], off[t], 1.0, 0.0, 0.0] if t < steps else [0.0] * 7)
+        second = [1.0, net[t], speed[t], off[t], must[t], 1.0, 0.0, 0.0] if t < steps else [0.0] * 8
+        rows.append(second)
     for block in range(grid.blocks):
         seconds = range(max(block * length, step + n), min((block + 1) * length, steps))
         classes: list[list[int]] = [[], [], []]
@@ -66,13 +70,14 @@ def horizon(cycle: Cycle, vehicle: Vehicle, settings: MhQpSettings, step: int) -
         into_hard = [t for t in seconds if demand[t - 1] <= grid.class_hard_w < demand[t]]
         off_braking = [t for t in seconds if demand[t - 1] < grid.class_braking_w <= demand[t]]
         for member, entries in zip(classes, ([], into_hard, off_braking), strict=True):
-            means = [float(np.mean(a[member])) for a in (net, speed, off)] if member else [0.0] * 3
+            of = (net, speed, off, must)
+            means = [float(np.mean(a[member])) for a in of] if member else [0.0] * 4
             swing = [-np.inf, -np.inf]  # inside a block SOC is not limited
             rows.append([float(len(member)), *means, -grid.rise_share * len(entries), *swing])
         if (block + 1) * length > step + n < steps and block * length < steps:
-            rows[-1][5:] = _kept_j(block * length, length, off, demand, vehicle, settings)
+            rows[-1][6:] = _kept_j(block * length, length, off, demand, vehicle, settings)
         else:
-            rows[-1][5:] = [0.0, 0.0]
+            rows[-1][6:] = [0.0, 0.0]
     return Horizon(*np.array(rows).T)
 
 
@@ -364,9 +369,8 @@ def stage_program(
             # sigma l((sigma P0 - E)/sigma) + (1 - sigma) l(P0) <= G
             terms = {at[INTERNAL]: -1.0, at[P_ENG]: -c, at[ON]: c * net + d - off}
             rows.add("battery piece", -off, terms)
-        fast = float(road.speed_mps[k]) - engine.electric_max_mps >= 1e-5
         taken = net + equations.charge_max_w
-        if fast:  # the engine turns, at its least power where the battery takes less
+        if road.must[k] > 0.0:  # the engine turns, at its least power where the battery takes less
             taken = max(taken, engine.power_min_w)
         most = min(engine.power_max_w, taken)
         rows.add("engine max", 0.0, {at[P_ENG]: 1.0, at[ON]: -most})
@@ -377,7 +381,7 @@ def stage_program(
             {at[P_ENG]: -1.0, at[ON]: engine.power_min_w},
         )
         rows.add("on-share max", 1.0, {at[ON]: 1.0})
-        rows.add("on-share min", -(0.99 if missing > 0.0 or fast else 0.0), {at[ON]: -1.0})
+        rows.add("on-share min", -0.99 * float(road.must[k]), {at[ON]: -1.0})
         strongest = max(net - engine.power_max_w, -equations.charge_max_w)
         charged = float(np.max(curves.battery.slope * strongest + curves.battery.intercept))
         reach -= h * charged / energy

@@ -15,7 +15,6 @@ from qpmpc.qp.settings import QpSettings
 from qpmpc.qp.stage_qp import T_CL_MAX_MARGIN_K
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.heat import air_w
-from qpmpc.vehicle.must_run import must_run
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.plant import EMPTY, FULL
 from qpmpc.verification.nonlinear.maps import SmoothMaps, casadi
@@ -235,8 +234,8 @@ class NlpProblem:
         lower, upper = np.zeros((self.stages, self.count)), np.zeros((self.stages, self.count))
         most = np.minimum(engine.power_max_w, net + vehicle.battery_charge_max_w)
         least = np.maximum(engine.power_min_w, net - vehicle.battery_discharge_max_w)
-        must = must_run(vehicle, net, stages.speed_mps)
-        can = must | (most > engine.power_min_w)
+        must = stages.must_share
+        can = (must > 0.0) | (most > engine.power_min_w)
         least = np.minimum(least, engine.power_max_w - POWER_GAP_W)
         most = np.maximum(most, least + POWER_GAP_W)
         hot_degc = t_cl_degc if t_cl_plan_degc is None else t_cl_plan_degc
@@ -245,7 +244,7 @@ class NlpProblem:
         upper[:, NlpVar.SOC] = soc_high / UNIT[NlpVar.SOC]
         lower[:, NlpVar.T_CL], upper[:, NlpVar.T_CL] = self.vehicle.thermal.t_amb_degc, 120.0
         upper[:, NlpVar.ABOVE] = np.inf
-        lower[:, NlpVar.ON] = np.where(must, SIGMA_FORCED, SIGMA_LEAST)
+        lower[:, NlpVar.ON] = np.maximum(SIGMA_FORCED * must, SIGMA_LEAST)
         upper[:, NlpVar.ON] = np.where(can, 1.0, 2.0 * SIGMA_LEAST)
         upper[:, NlpVar.T_SLACK :] = np.inf
         fields = stages.duration_s, net, stages.speed_mps, stages.internal_off_w

@@ -139,7 +139,11 @@ def _spoilt(preview: Preview, rng: np.random.Generator) -> Preview:
         n = len(long.duration_s)
         values = [rng.uniform(0, 60, n), *(rng.uniform(-2e4, 3e4, n) for _ in range(3))]
         values[2] = np.abs(values[2]) * 1e-3
-        values += [rng.uniform(0, 60, n), *(rng.uniform(0, 3e6, n) for _ in range(2))]
+        values += [
+            rng.uniform(0, 1, n),
+            rng.uniform(0, 60, n),
+            *(rng.uniform(0, 3e6, n) for _ in range(2)),
+        ]
     return preview._replace(long=Stages(*values))
 
 
