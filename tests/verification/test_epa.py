@@ -3,12 +3,25 @@
 import pytest
 
 from qpmpc.cycles import load_cycle
-from qpmpc.verification.checks.epa import CASES, TOLERANCE, US06, main, model_mpg
+from qpmpc.verification.checks.epa import (
+    CASES,
+    OF_WINTER,
+    OFF_EPA,
+    TOLERANCE,
+    US06,
+    main,
+    model_mpg,
+)
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_model_reproduces_its_reference(case):
     assert model_mpg(case) == pytest.approx(case.reference_mpg, rel=TOLERANCE)
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_the_car_of_winter_is_close_to_the_dynamometer(case):
+    assert model_mpg(case, OF_WINTER) == pytest.approx(case.epa_mpg, rel=OFF_EPA)
 
 
 def test_us06_is_the_published_schedule():

@@ -2,8 +2,9 @@
 
 Run it with ``python -m qpmpc.verification.checks.epa``. EPA's figures are unadjusted miles per
 gallon from its test-car list for the 2016 Prius; the plant was fitted to them with few free
-numbers, so this shows that the structure is consistent; it is not an independent validation. The
-fit was made with an engine that starts at no cost, `paper-nimh`; the default car stands beside.
+numbers, so this shows that the structure is consistent; it is not an independent validation. Two
+fits: with an engine that starts at no cost, `paper-nimh`, and with starts and all that makes a
+winter, `prius-2016`; the default car stands beside.
 """
 
 import sys
@@ -24,6 +25,8 @@ M_PER_MILE = 1609.344
 L_PER_GALLON = 3.785411784
 TOLERANCE = 0.03  # of the model's own reference figures
 AS_FITTED = "paper-nimh"
+OF_WINTER = "prius-2016"
+OFF_EPA = 0.05  # that we claim for it
 
 # S EPA test-car list, 2016 Prius, cold-CO test: all three coefficients are 11.1 % higher
 _COLD_ROAD = {"chassis.road_load_share_per_k": 0.00358}
@@ -90,28 +93,37 @@ def model_mpg(case: EpaCase, vehicle_name: str = AS_FITTED) -> float:
 
 
 def main() -> int:
-    """Print the table; the exit code is 1 if a figure is off its reference by more than 3 %."""
+    """Print the table; the exit code is 1 if a figure is further off than it should be.
+
+    3 % from the reference of the first fit, 5 % from EPA with the second.
+    """
     table = ShownTable(title="Rule-based, unadjusted mpg")
     as_fitted = ("as fitted", "off reference", "off EPA")
-    for column in ("case", "EPA", *as_fitted, "default", "off EPA"):
+    others = (DEFAULT_VEHICLE, OF_WINTER)
+    columns = [column for name in others for column in (name, "off EPA")]
+    for column in ("case", "EPA", *as_fitted, *columns):
         table.add_column(column, justify="left" if column == "case" else "right")
-    worst = 0.0
+    worst = furthest = 0.0
     for case in CASES:
         mpg = model_mpg(case)
         off = mpg / case.reference_mpg - 1.0
         worst = max(worst, abs(off))
-        default_mpg = model_mpg(case, DEFAULT_VEHICLE)
+        of_others = [model_mpg(case, name) for name in others]
+        furthest = max(furthest, abs(of_others[-1] / case.epa_mpg - 1.0))
         table.add_row(
             case.name,
             f"{case.epa_mpg:.1f}",
             f"{mpg:.1f}",
             f"{off:+.1%}",
             f"{mpg / case.epa_mpg - 1.0:+.1%}",
-            f"{default_mpg:.1f}",
-            f"{default_mpg / case.epa_mpg - 1.0:+.1%}",
+            *(
+                text
+                for other in of_others
+                for text in (f"{other:.1f}", f"{other / case.epa_mpg - 1.0:+.1%}")
+            ),
         )
     Console().print(table)
-    return 0 if worst <= TOLERANCE else 1
+    return 0 if worst <= TOLERANCE and furthest <= OFF_EPA else 1
 
 
 if __name__ == "__main__":
