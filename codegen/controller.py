@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from qpmpc.codegen.generate import Precision
 from qpmpc.codegen.host_library import build_host_library
-from qpmpc.codegen.values import values_of
+from qpmpc.codegen.values import Values, values_of
 from qpmpc.controllers.base import Controller, Decision, Progress, Receive
 from qpmpc.controllers.monitor import Flag
 from qpmpc.controllers.settings import ControllerSettings, MhQpSettings
+from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.expectation import expectation
 from qpmpc.trip import Observation, Trip
@@ -96,11 +97,23 @@ class GeneratedController(Controller):
         rules, section = self.settings.rule_based, name.replace("-", "_")
         values = values_of(trip.vehicle, self.of_qp, rules, blocks, section)
         self.reads_fuel = self.of_qp.learning
-        self._model = PwaModel.of(trip.vehicle, self.of_qp.pwa, self.of_qp.learning)
+        model = PwaModel.of(trip.vehicle, self.of_qp.pwa, self.of_qp.learning)
+        self._build(values, precision, self.of_qp.horizon, model, self.of_qp.prepared)
+
+    def _build(
+        self,
+        values: Values,
+        precision: Precision,
+        horizon: HorizonSettings,
+        model: PwaModel,
+        prepared: bool,
+    ) -> None:
+        """Build the library, and its state; `prepared`: solve before the trip."""
+        self._horizon, self._model, self._prepared = horizon, model, prepared
         self.library = self._normal = build_host_library(values, precision)
         self.remarks += filter(None, [self.library.remark])
         self.fill_s = self.call_s = 0.0
-        self._preview = trip.preview(self.of_qp.horizon)
+        self._preview = self.trip.preview(horizon)
         self._receive = self._preview.receive
         self.inputs = InputBuilder(self._receive)
         self._state = ctypes.create_string_buffer(self.library.state_bytes)
@@ -111,14 +124,13 @@ class GeneratedController(Controller):
         """Set a defined state; prepare the first plan, unless the settings disable that."""
         self.forget()
         self.expects = None
-        if self.of_qp.prepared:
+        if self._prepared:
             self.inputs.fill(self.trip.start, self._in)
             while (left := self.library.depart(self._state, ctypes.byref(self._in))) > 0:
                 pass
             if left == 0:
-                layout, stages = self.of_qp.horizon, self._preview.at(self.trip.start.step)
-                model, x = self._model, self.plan()[0]
-                self.expects = expectation(self.trip, layout, model, stages, x)
+                stages, x = self._preview.at(self.trip.start.step), self.plan()[0]
+                self.expects = expectation(self.trip, self._horizon, self._model, stages, x)
 
     def step(self, seen: Observation) -> Decision:
         """Run one step in C."""
@@ -129,6 +141,9 @@ class GeneratedController(Controller):
             self.library.solver_may_succeed.value = not self.solver_fails
         self.library.step(*self._arguments)
         self.fill_s, self.call_s = filled - start, perf_counter() - filled
+        return self._decision()
+
+    def _decision(self) -> Decision:
         return decision_of(self._out)
 
     def inject(
@@ -154,7 +169,7 @@ class GeneratedController(Controller):
         values = self.library.values
         stages = values.sizes.stages
         x = (self.library.real * (stages * values.variables))()
-        duals = (self.library.real * (stages * values.rows.count))()
+        duals = (self.library.real * (stages * values.row_count))()
         self.library.plan(self._state, x, duals)
         return (
             np.array(x, dtype=float).reshape(stages, -1),

@@ -14,17 +14,18 @@ from qpmpc._version import __version__
 from qpmpc.codegen.examples import example_files
 from qpmpc.codegen.osqp_source import CONSTANT_ARRAYS, PREFIX, osqp_files, osqp_version
 from qpmpc.codegen.prefix import checked_prefix, with_prefix
+from qpmpc.codegen.rows.costate_c import costate_files
 from qpmpc.codegen.rows.solver_c import rows_files
-from qpmpc.codegen.values import CONSTANTS, OF_LEARNING, Values
+from qpmpc.codegen.values import Values
 from qpmpc.errors import InputError
 from qpmpc.files import check_folder, write_text
 
 Precision = Literal["f32", "f64"]
 Target = Literal["host", "cortex-m7"]
-Algorithm = Literal["admm", "osqp"]
+Algorithm = Literal["admm", "osqp", "costate"]
 PRECISIONS: tuple[Precision, ...] = ("f32", "f64")
 TARGETS: tuple[Target, ...] = ("host", "cortex-m7")
-ALGORITHMS: tuple[Algorithm, ...] = ("admm", "osqp")
+ALGORITHMS: tuple[Algorithm, ...] = ("admm", "osqp")  # of a QP; without one there is no choice
 # Flash and RAM of the firmware: larger firmware does not link. For the algorithm written for this
 # problem the project's budget; OSQP takes more, see docs/embedded.md.
 MEMORY_KB: dict[tuple[Algorithm, Precision], tuple[int, int]] = {
@@ -32,7 +33,14 @@ MEMORY_KB: dict[tuple[Algorithm, Precision], tuple[int, int]] = {
     ("admm", "f64"): (128, 160),
     ("osqp", "f32"): (512, 384),
     ("osqp", "f64"): (512, 768),
+    ("costate", "f32"): (64, 64),
+    ("costate", "f64"): (64, 96),
 }
+
+# Files of the runtime that one method alone has; those of costates by their beginnings.
+OF_ADMM = {"mpc_admm.c", "mpc_admm.h"}
+OF_COSTATE = ("mpc_costate", "mpc_elementary")
+OF_QP = {"mpc_qp.c", "mpc_qp_method.c", "mpc_polish.c"}
 
 Name = TypeVar("Name", bound=str)
 
@@ -60,7 +68,8 @@ def generate(
     folder : of the project; files of the same names are replaced, others left alone
     target : `host` (shared library) or `cortex-m7` (bare metal, for QEMU's mps2-an500)
     precision : of all arithmetic
-    algorithm : `admm`, written for this problem, or `osqp`, OSQP's own embedded code
+    algorithm : `admm`, written for this problem, or `osqp`, OSQP's own embedded code; of no
+        effect without a QP
     prefix : before every name that begins with mpc_, see `with_prefix`
 
     Returns
@@ -96,17 +105,13 @@ def project_files(
     """
     one_of(target, TARGETS, "target")
     one_of(precision, PRECISIONS, "precision")
-    one_of(algorithm, ALGORITHMS, "algorithm")
+    if values.costate is not None:
+        algorithm = "costate"
+    else:
+        one_of(algorithm, ALGORITHMS, "algorithm")
     checked_prefix(prefix)
-    learning = values.learning
-    files = _texts("runtime") | rows_files(values.table, tuple(values.scalars), algorithm, learning)
-    if not learning:
-        del files["mpc_learned.c"]
-    of_osqp: dict[str, str] = {}
-    if algorithm == "osqp":
-        del files["mpc_admm.c"], files["mpc_admm.h"]
-        files |= _texts("osqp_adapter")
-        of_osqp = osqp_files(values, precision)
+    files = _runtime(values, algorithm)
+    of_osqp = osqp_files(values, precision) if algorithm == "osqp" else {}
     if target == "cortex-m7":
         files |= _texts("cortex_m7")
     context = _context(values, target, precision, algorithm)
@@ -127,6 +132,26 @@ def project_files(
         files[output] = _environment().get_template(template).render(context)
     files |= example_files(target)
     return with_prefix(dict(sorted((files | of_osqp).items())), prefix)
+
+
+def _runtime(values: Values, algorithm: Algorithm) -> dict[str, str]:
+    """Return the runtime's files of a method, and the headers made for it."""
+    left_out = set() if values.learning else {"mpc_learned.c"}
+    if algorithm != "admm":
+        left_out |= OF_ADMM
+    if algorithm == "costate":
+        left_out |= OF_QP
+    texts = _texts("runtime") | (_texts("osqp_adapter") if algorithm == "osqp" else {})
+    is_costate = algorithm == "costate"
+    files = {
+        name: text
+        for name, text in texts.items()
+        if name not in left_out and (is_costate or not name.startswith(OF_COSTATE))
+    }
+    scalars = tuple(values.scalars)
+    if is_costate:
+        return files | costate_files(values.table, scalars)
+    return files | rows_files(values.table, scalars, algorithm, values.learning)
 
 
 def one_of(name: str, names: tuple[Name, ...], what: str) -> Name:
@@ -196,7 +221,7 @@ def _context(
         "sizes": values.sizes,
         "constants": [
             (module, [(name, _count_or(literal, value)) for name, value in names.items()])
-            for module, names in (CONSTANTS | (OF_LEARNING if values.learning else {})).items()
+            for module, names in values.constants.items()
         ],
         "scalars": scalars | counts,
         "counts": counts,

@@ -83,7 +83,7 @@ def structures(precision: Precision, short: int, long: int, learning: bool) -> t
         _fields_ = [
             ("p_eng_w", real),
             ("on_share", real),
-            ("relaxation_gap", real),
+            ("relaxation_gap", real),  # of the costate method certificate_g
             ("engine_on", ctypes.c_int32),
             ("rung", ctypes.c_int32),
             ("flags", ctypes.c_int32),
@@ -169,7 +169,7 @@ class HostLibrary:
             sizes.short_stages,
             sizes.long_stages,
             values.variables,
-            values.rows.count,
+            values.row_count,
             values.iterations,
             self.input_type.short_count.offset,
             self.output_type.engine_on.offset,

@@ -1,8 +1,12 @@
-"""Which implementation runs a QP controller on this machine: generated C, or Python."""
+"""Which implementation runs a controller on this machine: generated C, or Python."""
+
+from collections.abc import Callable
 
 from qpmpc.codegen.c_compiler import CodegenError, compiler
 from qpmpc.codegen.controller import GeneratedController
+from qpmpc.codegen.costate_controller import GeneratedCostate
 from qpmpc.controllers.base import Controller
+from qpmpc.controllers.mh_costate import MhCostate, MhCostateSettings
 from qpmpc.controllers.qp_planner import QpPlanner
 from qpmpc.controllers.receding_horizon import RecedingHorizon
 from qpmpc.controllers.settings import ControllerSettings, MhQpSettings
@@ -10,22 +14,50 @@ from qpmpc.errors import InputError
 from qpmpc.remarks import say_once
 from qpmpc.trip import Trip
 
-SLOWER = "steps take several times longer (mh_qp.implementation=python says that this is meant)"
+SLOWER = "steps take several times longer ({section}.implementation=python says that this is meant)"
 
 
 def mh_qp(trip: Trip, settings: ControllerSettings | None = None) -> Controller:
     """Make `mh-qp` in the implementation that is set."""
     settings = settings or ControllerSettings()
-    return _made("mh-qp", trip, settings, settings.mh_qp)
+    return _made_qp("mh-qp", trip, settings, settings.mh_qp)
 
 
 def mh_qp_paper(trip: Trip, settings: ControllerSettings | None = None) -> Controller:
     """Make `mh-qp-paper`: the paper's grid and averaged preview."""
     settings = settings or ControllerSettings()
-    return _made("mh-qp-paper", trip, settings, settings.mh_qp_paper)
+    return _made_qp("mh-qp-paper", trip, settings, settings.mh_qp_paper)
 
 
-def _made(name: str, trip: Trip, settings: ControllerSettings, of_qp: MhQpSettings) -> Controller:
+def mh_costate(trip: Trip, settings: ControllerSettings | None = None) -> Controller:
+    """Make `mh-costate` in the implementation that is set."""
+    settings = settings or ControllerSettings()
+    own = settings.of("mh_costate", MhCostateSettings())
+    return _made(
+        MhCostate.name,
+        own.implementation,
+        lambda: GeneratedCostate(trip, settings),
+        lambda: RecedingHorizon(trip, MhCostate(trip, settings)),
+    )
+
+
+def _made_qp(
+    name: str, trip: Trip, settings: ControllerSettings, of_qp: MhQpSettings
+) -> Controller:
+    return _made(
+        name,
+        of_qp.implementation,
+        lambda: GeneratedController(trip, settings, of_qp, name=name),
+        lambda: RecedingHorizon(trip, QpPlanner(trip, settings, of_qp, name=name)),
+    )
+
+
+def _made(
+    name: str,
+    implementation: str,
+    in_c: Callable[[], Controller],
+    in_python: Callable[[], Controller],
+) -> Controller:
     """Make a controller in C or Python; a fallback of `auto` is reported with its reason.
 
     Raises
@@ -33,17 +65,17 @@ def _made(name: str, trip: Trip, settings: ControllerSettings, of_qp: MhQpSettin
     InputError, CodegenError
         If C is set and not available.
     """
-    reason = ""
-    if of_qp.implementation != "python":
+    reason, slower = "", SLOWER.format(section=name.replace("-", "_"))
+    if implementation != "python":
         try:
-            if of_qp.implementation == "auto" and compiler() is None:
+            if implementation == "auto" and compiler() is None:
                 raise CodegenError("no C compiler found (tried $CC, cc, gcc, clang)")
-            return GeneratedController(trip, settings, of_qp, name=name)
+            return in_c()
         except (InputError, CodegenError) as error:
-            if of_qp.implementation == "c":
+            if implementation == "c":
                 raise
-            reason = f"{name} runs in Python, not in C, {SLOWER}: {error}"
-    controller = RecedingHorizon(trip, QpPlanner(trip, settings, of_qp, name=name))
+            reason = f"{name} runs in Python, not in C, {slower}: {error}"
+    controller = in_python()
     if reason:
         controller.remarks.append(reason)
         say_once(reason)

@@ -1,15 +1,16 @@
 """The numbers of one generated controller: sizes, parameters and tables, as in the runtime."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
+from types import ModuleType
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from qpmpc.codegen.forecast_values import fixed_block_s, forecast_scalars
+from qpmpc.codegen.forecast_values import fixed_block_s
+from qpmpc.codegen.shared_values import Sizes, shared_values
 from qpmpc.controllers import monitor, qp_planner, ramp, realise, safety
 from qpmpc.controllers.qp_planner import DEPARTURE_LINEARISATIONS, WARM_UP_STEPS
 from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS
-from qpmpc.controllers.rule_based import last_rung
 from qpmpc.controllers.settings import MhQpSettings, RuleBasedSettings
 from qpmpc.errors import InputError
 from qpmpc.preview import checked, swing
@@ -23,34 +24,39 @@ from qpmpc.qp.stage_qp import qp_parameters
 from qpmpc.solvers import base
 from qpmpc.solvers.settings import AdmmSettings
 from qpmpc.vehicle import demand
-from qpmpc.vehicle.battery import BatteryMaps
-from qpmpc.vehicle.capability import Capability
-from qpmpc.vehicle.engine import OptimalLine, optimal_line
 from qpmpc.vehicle.parameters import Vehicle
 
 EQUALITY_RHO_FACTOR = 1000.0  # OSQP's own, on rows whose bounds are closer than the next figure
 EQUALITY_WIDTH = 1e-4  # solver units
 
-# Constants common to the C code and the Python controller, by module: names in C.
-CONSTANTS: dict[str, dict[str, float]] = {
-    module.__name__: {name: getattr(module, name) for name in names.split()}
-    for module, names in (
-        (ramp, "SOC_KEPT"),
-        (realise, "ON_THRESHOLD"),
-        (qp_planner, "FAILURES_FORGIVEN LEAST_SIZE_W"),
-        (linearisation, "COLDEST_DEGC HOTTEST_DEGC DEPARTURE_FUEL_G_PER_S DEPARTURE_P_ENG_W"),
-        (safety, "POWER_MARGIN_W SOC_MARGIN T_CL_MARGIN_K"),
-        (monitor, "LONG_AGO_S LONGEST_GAP_S"),
-        (checked, "LONGEST_STAGE_S NEWS"),
-        (swing, "NO_LIMIT_J LEAST_KEPT_J"),
-        (stage_qp, "LEAST_COST"),
-        (polish, "LEAST_RATIO"),
-        (coolant_floor, "USABLE"),
-        (rows, "SHORTEST_SCALE_S SIGMA_FORCED COOL_SHARE MOOT_G_PER_S"),
-        (base, "LARGEST_PLAUSIBLE"),
-        (demand, "GRAVITY_MPS2"),
-    )
-}
+
+def of_modules(*modules: tuple[ModuleType, str]) -> dict[str, dict[str, float]]:
+    """Return constants common to the C code and the Python controller, by module: names in C."""
+    return {
+        module.__name__: {name: getattr(module, name) for name in names.split()}
+        for module, names in modules
+    }
+
+
+CONSTANTS_OF_ALL = of_modules(
+    (ramp, "SOC_KEPT"),
+    (realise, "ON_THRESHOLD"),
+    (linearisation, "COLDEST_DEGC HOTTEST_DEGC DEPARTURE_FUEL_G_PER_S DEPARTURE_P_ENG_W"),
+    (safety, "POWER_MARGIN_W SOC_MARGIN T_CL_MARGIN_K"),
+    (monitor, "LONG_AGO_S LONGEST_GAP_S"),
+    (checked, "LONGEST_STAGE_S NEWS"),
+    (swing, "NO_LIMIT_J LEAST_KEPT_J"),
+    (coolant_floor, "USABLE"),
+    (qp_planner, "FAILURES_FORGIVEN"),
+    (base, "LARGEST_PLAUSIBLE"),
+    (demand, "GRAVITY_MPS2"),
+)
+CONSTANTS = CONSTANTS_OF_ALL | of_modules(
+    (qp_planner, "FAILURES_FORGIVEN LEAST_SIZE_W"),
+    (stage_qp, "LEAST_COST"),
+    (polish, "LEAST_RATIO"),
+    (rows, "SHORTEST_SCALE_S SIGMA_FORCED COOL_SHARE MOOT_G_PER_S"),
+)
 
 OF_LEARNING = {  # beside those, where the fuel map is learned
     learned_fuel.__name__: {
@@ -61,37 +67,6 @@ OF_LEARNING = {  # beside those, where the fuel map is learned
         )
     }
 }
-
-
-@dataclass(frozen=True)
-class Sizes:
-    """The dimensions of a generated controller.
-
-    Attributes
-    ----------
-    short_stages, blocks, classes : layout of the horizon
-    fuel_pieces, battery_pieces, alpha_pieces : pieces of the PWA curves
-    fuel_points, soc_points : points of the tables
-    """
-
-    short_stages: int
-    blocks: int
-    classes: int
-    fuel_pieces: int
-    battery_pieces: int
-    alpha_pieces: int
-    fuel_points: int
-    soc_points: int
-
-    @property
-    def long_stages(self) -> int:
-        """Stages beyond the short horizon."""
-        return self.blocks * self.classes
-
-    @property
-    def stages(self) -> int:
-        """All stages."""
-        return self.short_stages + self.long_stages
 
 
 @dataclass(frozen=True)
@@ -109,6 +84,8 @@ class Values:
     duration_exponent : of the column scaling
     block_s : length of a block; 0 if the trip's length sets it
     learning : whether the fuel map is learned
+    constants : common to the C code and Python, by module
+    costate : sizes of the costate method; None with the QP
     """
 
     vehicle: str
@@ -125,6 +102,18 @@ class Values:
     departure_linearisations: int = DEPARTURE_LINEARISATIONS
     plan_valid_steps: int = PLAN_VALID_STEPS
     warm_up_steps: int = WARM_UP_STEPS
+    constants: dict[str, dict[str, float]] = field(default_factory=lambda: CONSTANTS)
+    costate: dict[str, int] | None = None
+
+    @property
+    def has_start(self) -> bool:
+        """Whether a start of the engine costs anything."""
+        return self.table.has_start
+
+    @property
+    def row_count(self) -> int:
+        """Rows of a stage that have a dual."""
+        return self.rows.count if self.costate is None else 2
 
     @property
     def rows(self) -> Rows:
@@ -162,19 +151,11 @@ def values_of(
     """
     _refuse_unknown(settings, section)
     model = PwaModel.of(vehicle, settings.pwa, settings.learning)
-    line, maps = optimal_line(vehicle.engine), BatteryMaps(vehicle.battery)
-    blocks = settings.horizon.blocks if blocks is None else blocks
-    if blocks < 1:
-        raise InputError(
-            f"generated code needs a fixed number of blocks: set {section}.horizon.blocks to 1 or "
-            "more"
-        )
+    shared = shared_values(vehicle, model, settings.horizon, rules, blocks, section)
     scalars = {
         **qp_parameters(vehicle, model, settings.qp, settings.scaling),
-        **_plant(vehicle, line, maps),
+        **shared.scalars,
         **_solver(settings.admm),
-        **_rules(vehicle, last_rung(rules, vehicle)),
-        **forecast_scalars(vehicle, settings.horizon),
     }
     if not settings.qp.soc_penalty_g:
         band = (scalars["terminal_soc_high"] - scalars["terminal_soc_low"]) / scalars["unit_soc"]
@@ -183,18 +164,10 @@ def values_of(
                 f"{section}.qp.terminal_low and terminal_high leave no band for the final SOC "
                 f"(width {band * scalars['unit_soc']:.2g})"
             )
-    grid = vehicle.battery.soc_grid
     arrays = {
         **pieces_of(model),
         "fuel_begin_w": model.fuel.breakpoints[:-1],
-        "alpha_slope": model.alpha.slope,
-        "alpha_intercept": model.alpha.intercept,
-        "alpha_break": model.alpha.breakpoints[:-1],
-        "soc_grid": _array(grid),
-        "open_circuit_v": _array(vehicle.battery.open_circuit_v),
-        "resistance_charge_ohm": _array(vehicle.battery.resistance_charge_ohm),
-        "resistance_discharge_ohm": _array(vehicle.battery.resistance_discharge_ohm),
-        "fuel_g_per_s": line.fuel_g_per_s,
+        **shared.arrays,
     }
     if settings.learning:
         learner = learner_of(vehicle, settings.pwa)
@@ -204,29 +177,16 @@ def values_of(
     return Values(
         vehicle=vehicle.name,
         table=table_of(vehicle.engine),
-        sizes=Sizes(
-            settings.horizon.short_stages,
-            blocks,
-            settings.horizon.classes,
-            model.fuel.pieces,
-            model.battery.pieces,
-            model.alpha.pieces,
-            len(line.power_w),
-            len(grid),
-        ),
+        sizes=shared.sizes,
         scalars=scalars,
         arrays=arrays,
         iterations=settings.admm.iterations,
         departure_iterations=settings.admm.cold_iterations,
         duration_exponent=settings.scaling.duration_exponent,
-        counts={
-            "polish": int(settings.polish),
-            "min_on_s": vehicle.engine.min_on_s,
-            "min_off_s": vehicle.engine.min_off_s,
-            "rule_min_on_s": max(rules.min_on_s, vehicle.engine.min_on_s),
-        },
+        counts={"polish": int(settings.polish), **shared.counts},
         block_s=fixed_block_s(settings.horizon),
         learning=settings.learning,
+        constants=CONSTANTS | (OF_LEARNING if settings.learning else {}),
     )
 
 
@@ -244,28 +204,6 @@ def _refuse_unknown(settings: MhQpSettings, section: str) -> None:
         )
 
 
-def _array(values: ArrayLike) -> NDArray[np.float64]:
-    return np.asarray(values, dtype=float)
-
-
-def _plant(vehicle: Vehicle, line: OptimalLine, maps: BatteryMaps) -> dict[str, float]:
-    """Maps of the plant that the QP does not contain; the plan's battery is at the mean SOC."""
-    cold, soc_mean = vehicle.cold_engine, vehicle.trip.soc_mean
-    return {
-        "fuel_step_w": float(line.power_w[1] - line.power_w[0]),  # grid of fuel_g_per_s, from 0
-        **{f"cold_{name}": float(value) for name, value in cold.model_dump().items()},
-        **{f"can_{name}": value for name, value in asdict(Capability.of(vehicle, line)).items()},
-        "charge_c": maps.charge_c,
-        "start_energy_j": vehicle.engine.start_energy_j,
-        "ramp_w_per_s": vehicle.engine.ramp_w_per_s,
-        "aux_power_w": vehicle.battery.aux_power_w,
-        "t_cl_init_degc": vehicle.trip.t_cl_init_degc,
-        "plan_voltage_v": maps.open_circuit.at(soc_mean),
-        "plan_resistance_discharge_ohm": maps.discharge.at(soc_mean),
-        "plan_resistance_charge_ohm": maps.charge.at(soc_mean),
-    }
-
-
 def _solver(admm: AdmmSettings) -> dict[str, float]:
     return {
         "rho": admm.rho,
@@ -273,18 +211,4 @@ def _solver(admm: AdmmSettings) -> dict[str, float]:
         "rho_equality": admm.rho * EQUALITY_RHO_FACTOR,
         "proximal": admm.proximal_weight,
         "relaxation": admm.relaxation,
-    }
-
-
-def _rules(vehicle: Vehicle, rules: RuleBasedSettings) -> dict[str, float]:
-    return {
-        "rule_k_soc_w": rules.k_soc_w,
-        "rule_soc_ref": vehicle.trip.soc_target + rules.soc_ref_offset,
-        "rule_on_w": rules.on_w,
-        "rule_off_w": rules.off_w,
-        "rule_power_min_w": rules.power_min_w,
-        "rule_heat_power_w": rules.heat_power_w,
-        "rule_heat_on_degc": rules.heat_on_degc,
-        "rule_heat_off_degc": rules.heat_off_degc,
-        "rule_soc_forced": rules.forced_below(vehicle.battery),
     }

@@ -25,6 +25,10 @@ from qpmpc.vehicle.parameters import Vehicle
 _CONTROLLERS = {
     "mh-qp": Shipped("qpmpc.codegen.implementation:mh_qp"),
     "mh-qp-paper": Shipped("qpmpc.codegen.implementation:mh_qp_paper"),
+    "mh-costate": Shipped(
+        "qpmpc.codegen.implementation:mh_costate",
+        settings="qpmpc.controllers.mh_costate:MhCostateSettings",
+    ),
     "rule-based": Shipped("qpmpc.controllers.balance:rule_based"),
     "ecms": Shipped("qpmpc.controllers.ecms:Ecms"),
     "dp": Shipped(
@@ -36,10 +40,6 @@ _CONTROLLERS = {
 }
 _PLANNERS = {
     "baseline-mpc": Shipped("qpmpc.controllers.baseline_mpc:baseline_mpc"),
-    "mh-costate": Shipped(
-        "qpmpc.controllers.mh_costate:MhCostate",
-        settings="qpmpc.controllers.mh_costate:MhCostateSettings",
-    ),
     "mh-nlp": Shipped("qpmpc.verification.nonlinear.mh_nlp:MhNlp", "casadi", "verification"),
 }
 CONTROLLERS = Names("controller", _CONTROLLERS, beside=_PLANNERS)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from qpmpc.codegen.generate import Algorithm, Precision, generate
-from qpmpc.codegen.values import values_of
+from qpmpc.codegen.method import Generated, Method
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.vehicle import Vehicle, load_vehicle
 
@@ -38,7 +38,8 @@ def make_project(
 ) -> None:
     """Write the project for this machine, and the programs that attack it."""
     chosen = ControllerSettings().with_settings(settings or {})
-    values = values_of(vehicle or load_vehicle(), chosen.mh_qp, chosen.rule_based)
+    name: Generated = "mh-costate" if algorithm == "costate" else "mh-qp"
+    values = Method.of(name, chosen).values(vehicle or load_vehicle(), None)
     generate(values, folder, "host", precision, algorithm)
     for file in (resources.files("qpmpc.codegen") / "fuzz").iterdir():
         (folder / file.name).write_text(file.read_text("utf-8"))

@@ -2,6 +2,7 @@
 
 from qpmpc.closed_loop import drive
 from qpmpc.codegen.controller import GeneratedController
+from qpmpc.codegen.costate_controller import GeneratedCostate
 from qpmpc.codegen.generate import Precision
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.trip import Trip
@@ -33,8 +34,11 @@ int main(int argc, char **argv)
 class Recorder:
     """The generated controller drives a trip; what goes in and comes out is kept as bytes."""
 
-    def __init__(self, trip: Trip, settings: ControllerSettings, precision: Precision) -> None:
-        self.controller = GeneratedController(trip, settings, precision=precision)
+    def __init__(
+        self, trip: Trip, settings: ControllerSettings, precision: Precision, name: str = "mh-qp"
+    ) -> None:
+        made = GeneratedCostate if name == "mh-costate" else GeneratedController
+        self.controller = made(trip, settings, precision=precision)
         self.inputs, self.outputs = bytearray(), bytearray()
         self.run = drive(trip, self.controller, on_step=self._keep)
 

@@ -35,7 +35,7 @@ def builder(vehicle_name: str) -> tuple[StageBuilder, ProgramBuilder]:
     trace = Trace(whole.demand_w[part], whole.speed_mps[part])
     stages = StageBuilder(vehicle, trace, trace, HORIZON)
     limits = LimitSettings(t_cl_margin_k=0.0, soc_reserve=0.0, terminal_high=1.001)
-    return stages, ProgramBuilder(vehicle, PwaModel.of(vehicle), stages.count, limits)
+    return stages, ProgramBuilder(vehicle, PwaModel.of(vehicle), stages.count, limits, HORIZON)
 
 
 def program(

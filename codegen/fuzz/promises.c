@@ -44,7 +44,12 @@ static int is_in_range(const second_start *told, const mpc_out *out)
     const int is_on = out->engine_on == 1 && out->p_eng_w >= mpc_par.engine_min_w
                       && (double)out->p_eng_w <= greatest_w(told) + tolerance[0];
     const int is_off = out->engine_on == 0 && same(out->p_eng_w, 0);
-    return (is_on || is_off) && isfinite(out->on_share) && isfinite(out->relaxation_gap);
+#if MPC_COSTATE
+    const mpc_real proof = out->certificate_g;
+#else
+    const mpc_real proof = out->relaxation_gap;
+#endif
+    return (is_on || is_off) && isfinite(out->on_share) && isfinite(proof);
 }
 
 static int is_as_given(const mpc_measured *used, const mpc_in *in)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.closed_loop import drive
-from qpmpc.codegen.controller import InputBuilder, decision_of
+from qpmpc.codegen.controller import InputBuilder
 from qpmpc.codegen.firmware import (
     STACK_RESERVED_BYTES,
     Footprint,
@@ -19,9 +19,8 @@ from qpmpc.codegen.firmware import (
     footprint,
 )
 from qpmpc.codegen.generate import Algorithm, Precision
-from qpmpc.codegen.values import values_of
+from qpmpc.codegen.method import Generated, Method
 from qpmpc.controllers.base import Controller, Decision, Progress
-from qpmpc.controllers.mh_qp import MhQp
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.results import Run
 from qpmpc.trip import Observation, Trip
@@ -139,17 +138,14 @@ class PilResult:
 class _OnTarget(Controller):
     """The firmware as a controller."""
 
-    name = "mh-qp"
     implementation = "c"
     has_monitor = has_safety_layer = True  # in the firmware
 
-    def __init__(
-        self, trip: Trip, settings: ControllerSettings, target: Target, label: str
-    ) -> None:
-        super().__init__(trip, settings)
-        self.solver_name = label
-        horizon = self.settings.mh_qp.horizon
-        self._target, self._inputs = target, InputBuilder(trip.preview(horizon).receive)
+    def __init__(self, trip: Trip, method: Method, target: Target, label: str) -> None:
+        self.name = method.name
+        super().__init__(trip)
+        self.solver_name, self._method = label, method
+        self._target, self._inputs = target, InputBuilder(trip.preview(method.horizon).receive)
         self._in = target.input_type()
         self.departure_instructions: list[int] = []
         self.instructions: list[int] = []
@@ -159,7 +155,7 @@ class _OnTarget(Controller):
     def depart(self, progress: Progress | None = None) -> None:
         """Solve the first plan on the target, slice by slice."""
         self._target.init()
-        left = int(self.settings.mh_qp.prepared)
+        left = int(self._method.prepared)
         self._inputs.fill(self.trip.start, self._in)
         while left > 0:
             answer = self._target.depart(self._in)
@@ -173,7 +169,7 @@ class _OnTarget(Controller):
         self.instructions.append(answer.instructions)
         self.flags.append(answer.result)
         self.stack_bytes, self.state_bytes = answer.stack_bytes, answer.state_bytes
-        return decision_of(answer.out)
+        return self._method.decision(answer.out)
 
 
 def processor_in_the_loop(
@@ -182,6 +178,7 @@ def processor_in_the_loop(
     precision: Precision = "f32",
     progress: Progress | None = None,
     algorithm: Algorithm = "admm",
+    controller: Generated = "mh-qp",
 ) -> PilResult:
     """Drive a trip with the firmware in QEMU (mps2-an500, Cortex-M7) on the Python plant.
 
@@ -190,7 +187,8 @@ def processor_in_the_loop(
     trip, settings : the trip to drive, and settings of the controllers
     precision : of the firmware
     progress : called as progress(steps done, steps in all)
-    algorithm : of the firmware
+    algorithm : of the QP, in the firmware
+    controller : that the firmware is
 
     Raises
     ------
@@ -199,10 +197,11 @@ def processor_in_the_loop(
     InputError
         If the settings do not fit generated code.
     """
-    settings = settings or ControllerSettings()
-    blocks = settings.mh_qp.horizon.block_count(trip.forecast.steps)
-    values = values_of(trip.vehicle, settings.mh_qp, settings.rule_based, blocks)
-    twin = MhQp(trip, settings)
+    method = Method.of(controller, settings or ControllerSettings())
+    values = method.values(trip.vehicle, method.horizon.block_count(trip.forecast.steps))
+    if values.costate is not None:
+        algorithm = "costate"
+    twin = method.twin(trip)
     commands: list[Command] = []
     references: list[Command] = []
 
@@ -215,7 +214,7 @@ def processor_in_the_loop(
         elf = build_firmware(values, precision, folder, algorithm)
         with Target(elf, values, precision, folder) as target:
             label = f"{algorithm} {precision} on cortex-m7"
-            firmware = _OnTarget(trip, settings, target, label)
+            firmware = _OnTarget(trip, method, target, label)
             start = perf_counter()
             run = drive(trip, firmware, on_step=compare, progress=progress)
             seconds = perf_counter() - start
@@ -226,7 +225,7 @@ def processor_in_the_loop(
         precision=precision,
         iterations=values.iterations,
         run=run,
-        reference=drive(trip, MhQp(trip, settings)),
+        reference=drive(trip, method.twin(trip)),
         instructions=np.array(firmware.instructions),
         departure_instructions=np.array(firmware.departure_instructions, dtype=np.int64),
         command_w=np.array([c.p_eng_w for c in commands]),

@@ -11,6 +11,13 @@ from qpmpc.qp.expressions import FormulaError, targets_of
 WIDTH = 100  # of a line of C
 _OPERATORS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 _COMPARISONS = {ast.Gt: ">", ast.Lt: "<", ast.GtE: ">=", ast.LtE: "<="}
+# Functions that are 1 where a comparison holds, and whether its sides change places in them.
+_FLAGS = {
+    ast.Gt: ("above", False),
+    ast.Lt: ("above", True),
+    ast.GtE: ("not_below", False),
+    ast.LtE: ("not_below", True),
+}
 
 
 class Writer:
@@ -92,7 +99,9 @@ class Writer:
                 _, *arguments = [argument.arg for argument in given.args]
             case _:
                 raise FormulaError(f"{name} does not end with a return")
-        inner = Writer(self.names | {argument: argument for argument in arguments}, self._functions)
+        inner = type(self)(
+            self.names | {argument: argument for argument in arguments}, self._functions
+        )
         lines, kind, before = inner.lines(body), "mpc_real", ""
         if isinstance(value, ast.Tuple):
             parts = [part.id for part in value.elts if isinstance(part, ast.Name)]
@@ -104,6 +113,21 @@ class Writer:
         signature = ", ".join(f"mpc_real {argument}" for argument in arguments) or "void"
         start = f"{before}static inline {kind} {self._functions[name]}({signature})\n"
         return f"{start}{{\n{_body(lines)}\n}}\n"
+
+
+class ArithmeticWriter(Writer):
+    """Writes `where` as arithmetic of both its values, so that no compiler makes a branch of it."""
+
+    def expression(self, node: ast.expr) -> str:
+        """Write an expression; see `Writer`."""
+        match node:
+            case ast.Call(func=ast.Name(id="where"), args=arguments):
+                return f"blend({', '.join(self.expression(part) for part in arguments)})"
+            case ast.Compare(left, [op], [right]) if type(op) in _FLAGS:
+                name, is_turned = _FLAGS[type(op)]
+                sides = [self.expression(side) for side in (left, right)]
+                return f"{name}({', '.join(sides[::-1] if is_turned else sides)})"
+        return super().expression(node)
 
 
 def _body(lines: Iterable[str]) -> str:

@@ -154,6 +154,13 @@ def types_h(table: Table) -> str:
             "Rows of a stage. Those of one entry are 1 after scaling.", "mpc_stage_matrix", matrix
         ),
         struct("Bounds other than 0.", "mpc_stage_bounds", limits),
+        *road_types(),
+    )
+
+
+def road_types() -> list[str]:
+    """Return the types that every method needs: of the road, and of sums along it."""
+    return [
         struct(
             "The road, duration 0 for a masked stage, which passes the state on at no cost; the\n"
             " * point about which the coolant's heat and the thermostat are expanded; and the\n"
@@ -162,7 +169,7 @@ def types_h(table: Table) -> str:
             (*STAGE, *(f"about_{name}" for name in ABOUT), FLOOR[0]),
         ),
         struct("Sums over the stages.", "mpc_stage_sums", _running()),
-    )
+    ]
 
 
 def _running() -> list[str]:
@@ -176,14 +183,9 @@ def _running() -> list[str]:
 
 def values_h(table: Table, scalars: Iterable[str], learning: bool) -> str:
     """Return `mpc_rows_values.h`: entries, bounds, scaling and cost of a stage."""
-    names = {name: f"mpc_par.{name}" for name in scalars}
-    names |= {name: f"mpc_par.{name}[i]" for name in PIECES}
+    names = names_of_values(scalars)
     if learning:
         names |= {name: f"state->learned.{place}" for name, place in LEARNED_PLACES.items()}
-    names |= {name: f"road->{name}" for name in INPUTS}
-    names |= {name: f"state->{name}" for name in (*ORIGIN, FLOOR[1])}
-    names |= {name: name for name, value in vars(rows).items() if isinstance(value, float)}
-    names |= {"start_soc": "REAL(0.0)", "is_last": "is_last", "on_now": "on_now"}
     return header(
         "mpc_rows_values.h",
         "Values of a stage's rows, scaled to unit norm, and its weights in the cost.",
@@ -191,6 +193,16 @@ def values_h(table: Table, scalars: Iterable[str], learning: bool) -> str:
         _scale(table),
         _fill(table, Writer(names, FUNCTIONS)),
     )
+
+
+def names_of_values(scalars: Iterable[str]) -> dict[str, str]:
+    """Names in C of what the table's quantities are made of."""
+    names = {name: f"mpc_par.{name}" for name in scalars}
+    names |= {name: f"mpc_par.{name}[i]" for name in PIECES}
+    names |= {name: f"road->{name}" for name in INPUTS}
+    names |= {name: f"state->{name}" for name in (*ORIGIN, FLOOR[1])}
+    names |= {name: name for name, value in vars(rows).items() if isinstance(value, float)}
+    return names | {"start_soc": "REAL(0.0)", "is_last": "is_last", "on_now": "on_now"}
 
 
 def _scale(table: Table) -> str:
@@ -261,9 +273,9 @@ def _fill_row(row: Row, writer: Writer) -> list[str]:
     return lines
 
 
-def heat_h(scalars: Iterable[str]) -> str:
+def heat_h(scalars: Iterable[str], kind: type[Writer] = Writer) -> str:
     """Return `mpc_heat.h`: heat that leaves the coolant, as in the plant."""
-    writer = Writer({name: f"mpc_par.{name}" for name in scalars}, FUNCTIONS)
+    writer = kind({name: f"mpc_par.{name}" for name in scalars}, FUNCTIONS)
     functions = [writer.function(formula) for formula in FORMULAS]
     what = "Heat that leaves the coolant, and its temperature: qpmpc.vehicle.heat, qp.coolant."
     return header("mpc_heat.h", what, ["mpc_model.h", "mpc_real.h"], *functions)

@@ -80,10 +80,14 @@ enum {
 };
 
 typedef struct {
-    mpc_real p_eng_w;        /* engine power; 0 with the engine off */
-    mpc_real on_share;       /* planned on-share of the coming second; 0 if there is no new plan */
+    mpc_real p_eng_w;  /* engine power; 0 with the engine off */
+    mpc_real on_share; /* planned on-share of the coming second; 0 if there is no new plan */
+#if MPC_COSTATE
+    mpc_real certificate_g; /* by how much the plan may at most be improved; 0 without a new one */
+#else
     mpc_real relaxation_gap; /* relative slack of the relaxed curves; 0 if there is no new plan */
-    int32_t engine_on;       /* 0 or 1 */
+#endif
+    int32_t engine_on; /* 0 or 1 */
     int32_t rung;
     int32_t flags;
     int32_t iterations; /* of the solver in this call */

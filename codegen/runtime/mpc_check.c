@@ -38,9 +38,7 @@ int32_t mpc_check_state(const mpc_state *state)
     fine &= is_count(state->failures, FAILURES_FORGIVEN) & is_count(state->is_under_way, 1);
     fine &= is_count(state->depart_linearisation, MPC_DEPARTURE_LINEARISATIONS);
     fine &= is_count(state->depart_left, MPC_DEPARTURE_ITERATIONS);
-    if (state->phase == MPC_PHASE_DEPARTING) {
-        fine &= within(state->cost, LEAST_COST, REAL(1.0) / LEAST_COST);
-    }
+    fine &= mpc_method_check(state);
     fine &= is_count(rules->power_request, 1) & is_count(rules->heat_request, 1);
     fine &= is_count(watch->soc_since_s, LONG_AGO_S) & is_count(watch->t_cl_since_s, LONG_AGO_S);
     fine &= is_count(watch->has_clock, 1) & is_count(watch->command_on, 1);
@@ -152,9 +150,9 @@ int32_t mpc_check_measured(mpc_watch *watch, const mpc_in *in, int32_t *elapsed)
     watch->has_clock = 1;
     watch->soc_since_s = later(watch->soc_since_s, passed);
     watch->t_cl_since_s = later(watch->t_cl_since_s, passed);
-    if (passed > 0) {
-        predict(watch, &soc, &t_cl_degc);
-    }
+    predict(watch, &soc, &t_cl_degc); /* always: it takes time */
+    soc = (passed > 0) ? soc : good->soc;
+    t_cl_degc = (passed > 0) ? t_cl_degc : good->t_cl_degc;
     /* a value out of range is beyond any reach */
     const mpc_real seen_soc = (within(in->soc, REAL(0.0), REAL(1.0)) != 0) ? in->soc : NO_VALUE;
     const mpc_real seen_degc =

@@ -1,12 +1,14 @@
 /* The iterate, primal and dual: its start, its units, whether it may be used. The same for every
  * algorithm. */
 #include "mpc_constants.h"
+#include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
 #define LARGEST_FINITE REAL(1.0e30)
 
-/* A cold start: all variables 0, SOC and coolant temperature too. */
+/* A cold start: all variables 0, SOC and coolant temperature too; of the multipliers that of SOC is
+ * a guess where it is a price. */
 void mpc_iterate_clear(mpc_state *state)
 {
     for (int32_t k = 0; k < MPC_STAGES; k++) {
@@ -16,13 +18,17 @@ void mpc_iterate_clear(mpc_state *state)
         for (int32_t i = 0; i < MPC_ROWS; i++) {
             state->stage[k].y[i] = REAL(0.0);
         }
+#if MPC_COSTATE
+        state->stage[k].y[MPC_ROW_CHARGE] = mpc_par.cold_charge_g;
+#endif
     }
     state->origin_soc = REAL(0.0);
     state->origin_t_cl_degc = REAL(0.0);
 }
 
 /* Short stages move up by some seconds (in equal time); the last keeps its values; long stages
- * keep their place. */
+ * keep their place. What a limit of the coolant costs in a second is that second's own: it is not
+ * there twice. */
 void mpc_iterate_shift(mpc_state *state, int32_t by)
 {
     for (int32_t k = 0; k < (MPC_SHORT - 1); k++) {
@@ -34,34 +40,15 @@ void mpc_iterate_shift(mpc_state *state, int32_t by)
         for (int32_t i = 0; i < MPC_ROWS; i++) {
             state->stage[k].y[i] = state->stage[from].y[i];
         }
+#if MPC_COSTATE
+        mpc_real *const heat = &state->stage[k].y[MPC_ROW_HEAT];
+        *heat = (later < MPC_SHORT) ? *heat : REAL(0.0);
+#endif
     }
-}
-
-void mpc_iterate_to_solver_units(mpc_state *state)
-{
-    for (int32_t k = 0; k < MPC_STAGES; k++) {
-        mpc_stage *const stage = &state->stage[k];
-        for (int32_t i = 0; i < MPC_VARS; i++) {
-            stage->x[i] /= stage->column[i];
-        }
-        for (int32_t i = 0; i < MPC_ROWS; i++) {
-            stage->y[i] *= state->cost / stage->row[i];
-        }
-    }
-}
-
-void mpc_iterate_to_si_units(mpc_state *state)
-{
-    const mpc_real price = REAL(1.0) / state->cost;
-    for (int32_t k = 0; k < MPC_STAGES; k++) {
-        mpc_stage *const stage = &state->stage[k];
-        for (int32_t i = 0; i < MPC_VARS; i++) {
-            stage->x[i] *= stage->column[i];
-        }
-        for (int32_t i = 0; i < MPC_ROWS; i++) {
-            stage->y[i] *= stage->row[i] * price;
-        }
-    }
+#if MPC_COSTATE
+    mpc_real *const last = &state->stage[MPC_SHORT - 1].y[MPC_ROW_HEAT];
+    *last = (by == 0) ? *last : REAL(0.0);
+#endif
 }
 
 /* False for NaN. */
@@ -107,5 +94,5 @@ int32_t mpc_iterate_restore(mpc_state *state)
     return all_below(state, LARGEST_FINITE);
 }
 
-/* Solved or stopped at the limit with finite, plausible numbers, in solver units. */
+/* Solved or stopped at the limit with finite, plausible numbers, in units of the method. */
 int32_t mpc_iterate_usable(const mpc_state *state) { return all_below(state, LARGEST_PLAUSIBLE); }

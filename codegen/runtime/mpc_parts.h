@@ -20,12 +20,28 @@ mpc_real mpc_pwa_alpha(mpc_real t_cl_degc);
 mpc_real mpc_pwa_alpha_slope(mpc_real t_cl_degc);
 mpc_real mpc_pwa_battery(mpc_real power_w);
 
+/* mpc_stages.c: the stages of a second */
+void mpc_stages_take(mpc_state *state, const mpc_in *in);
+void mpc_stages_move_up(mpc_state *state, int32_t by);
+void mpc_stages_move_origin(mpc_state *state, mpc_real soc, mpc_real t_cl_degc);
+void mpc_stages_expand_cold(mpc_state *state);
+void mpc_stages_expand_about_plan(mpc_state *state);
+
+/* The method of planning, mpc_qp_method.c or mpc_costate_solve.c and mpc_costate_plan.c.
+ * mpc_method_claim: makes this controller its user from now on. mpc_method_check: whether its own
+ * memory is sound. mpc_method_start: makes the values of a second and starts at the iterate.
+ * mpc_method_iterate: iterates; returns 0 if the method itself reports a failure.
+ * mpc_method_finish: puts the plan into the iterate; returns whether it is usable.
+ * mpc_method_plan: on-share and mean power of the seconds ahead. */
+void mpc_method_claim(const mpc_state *state);
+int32_t mpc_method_check(const mpc_state *state);
+void mpc_method_start(mpc_state *state);
+int32_t mpc_method_iterate(mpc_state *state, int32_t count);
+int32_t mpc_method_finish(mpc_state *state, int32_t solved);
+void mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p_eng_w);
+void mpc_method_report(const mpc_state *state, mpc_out *out);
+
 /* mpc_qp.c: values of the quadratic program */
-void mpc_qp_road(mpc_state *state, const mpc_in *in);
-void mpc_qp_road_move_up(mpc_state *state, int32_t by);
-void mpc_qp_move_origin(mpc_state *state, mpc_real soc, mpc_real t_cl_degc);
-void mpc_qp_linearise_cold(mpc_state *state);
-void mpc_qp_linearise_about_plan(mpc_state *state);
 void mpc_qp_update(mpc_state *state);
 mpc_real mpc_qp_relaxation_gap(const mpc_state *state);
 
@@ -44,13 +60,11 @@ void mpc_floor_find(mpc_state *state, mpc_real soc);
 /* mpc_iterate.c: the iterate */
 void mpc_iterate_clear(mpc_state *state);
 void mpc_iterate_shift(mpc_state *state, int32_t by);
-void mpc_iterate_to_solver_units(mpc_state *state);
-void mpc_iterate_to_si_units(mpc_state *state);
 int32_t mpc_iterate_usable(const mpc_state *state);
 void mpc_iterate_keep(mpc_state *state);
 int32_t mpc_iterate_restore(mpc_state *state);
 
-/* The algorithm. mpc_solver_claim: makes this controller its user from now on. mpc_solver_start:
+/* The algorithm of the QP. mpc_solver_claim: makes this controller its user from now on. mpc_solver_start:
  * takes values and iterate, in solver units. mpc_solver_iterate: iterates; returns 0 if the
  * algorithm itself reports a failure. */
 void mpc_solver_claim(const mpc_state *state);

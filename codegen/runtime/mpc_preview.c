@@ -123,7 +123,8 @@ int32_t mpc_preview_check(mpc_heard *heard, const mpc_in *in, int32_t elapsed)
 {
     heard->age = ((heard->age + elapsed) < MPC_NO_PLAN) ? (heard->age + elapsed) : MPC_NO_PLAN;
     const int32_t possible = is_possible(in);
-    const int32_t is_news = ((heard->age == 0) || (is_same(heard, in) == 0)) ? 1 : 0;
+    const int32_t is_old = is_same(heard, in); /* always: it takes time */
+    const int32_t is_news = ((heard->age == 0) || (is_old == 0)) ? 1 : 0;
     const int32_t follows = goes_on(heard, in) & is_news;
     const int32_t fine = possible & ((heard->age == MPC_NO_PLAN) ? 1 : follows);
     if (possible != 0) {

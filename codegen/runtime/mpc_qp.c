@@ -5,120 +5,12 @@
  * T_k being the mean coolant temperature of stage k. Scaling: columns by unit and duration, rows
  * to unit norm, cost so that its largest fuel entry is 1. 
  */
-#include "mpc_battery_side.h"
 #include "mpc_constants.h"
 #include "mpc_learned.h"
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
 #include "mpc_rows_values.h"
-#include "mpc_must_run.h"
-
-/* Preview to stages: seconds first, then the classes of each block; past stages are masked. */
-void mpc_qp_road(mpc_state *state, const mpc_in *in)
-{
-    for (int32_t k = 0; k < MPC_SHORT; k++) {
-        mpc_stage *const stage = &state->stage[k];
-        const int32_t seen = (k < in->short_count) ? 1 : 0;
-        stage->road.duration_s = (seen != 0) ? REAL(1.0) : REAL(0.0);
-        stage->road.net_w = (seen != 0) ? battery_side_w(in->short_demand_w[k]) : REAL(0.0);
-        stage->road.speed_mps = (seen != 0) ? in->short_speed_mps[k] : REAL(0.0);
-        stage->road.internal_off_w = mpc_map_planned_internal_w(stage->road.net_w);
-        stage->road.must_share = (mpc_real)must_run(stage->road.net_w, stage->road.speed_mps);
-        stage->road.rises = (seen != 0) ? REAL(1.0) : REAL(0.0);
-        stage->road.fall_j = REAL(0.0);
-        stage->road.rise_j = REAL(0.0);
-    }
-    for (int32_t k = 0; k < MPC_LONG; k++) {
-        mpc_stage *const stage = &state->stage[MPC_SHORT + k];
-        stage->road.duration_s = in->long_duration_s[k];
-        stage->road.net_w = in->long_net_w[k];
-        stage->road.speed_mps = in->long_speed_mps[k];
-        stage->road.internal_off_w = in->long_internal_off_w[k];
-        stage->road.must_share = in->long_must_share[k];
-        /* what rises into a class, falls from it to the next stage, the class below */
-        stage->road.rises = ((k % MPC_CLASSES) > 0) ? (-mpc_par.rise_share * in->long_rises[k - 1])
-                                                    : REAL(0.0);
-        /* inside a block SOC is not limited: the order of its classes in time is not known */
-        const int32_t ends_block = ((k % MPC_CLASSES) == (MPC_CLASSES - 1)) ? 1 : 0;
-        stage->road.fall_j = (ends_block != 0) ? in->long_fall_j[k] : -NO_LIMIT_J;
-        stage->road.rise_j = (ends_block != 0) ? in->long_rise_j[k] : -NO_LIMIT_J;
-    }
-}
-
-/* The last good preview, some seconds later: short stages move up and are masked at the end. */
-void mpc_qp_road_move_up(mpc_state *state, int32_t by)
-{
-    for (int32_t k = 0; k < MPC_SHORT; k++) {
-        const int32_t from = k + by;
-        mpc_stage_road *const road = &state->stage[k].road;
-        const mpc_stage_road *const later =
-            &state->stage[(from < MPC_SHORT) ? from : (MPC_SHORT - 1)].road;
-        const mpc_real seen = (from < MPC_SHORT) ? REAL(1.0) : REAL(0.0);
-        road->duration_s = seen * later->duration_s;
-        road->net_w = seen * later->net_w;
-        road->speed_mps = seen * later->speed_mps;
-        road->internal_off_w = seen * later->internal_off_w;
-        road->must_share = seen * later->must_share;
-        road->rises = seen * later->rises;
-        road->fall_j = REAL(0.0);
-        road->rise_j = REAL(0.0);
-    }
-}
-
-/* Count SOC and coolant temperature from a newly measured state. */
-void mpc_qp_move_origin(mpc_state *state, mpc_real soc, mpc_real t_cl_degc)
-{
-    const mpc_real soc_step = state->origin_soc - soc;
-    const mpc_real t_cl_step = state->origin_t_cl_degc - t_cl_degc;
-    for (int32_t k = 0; k < MPC_STAGES; k++) {
-        state->stage[k].x[MPC_VAR_SOC] += soc_step;
-        state->stage[k].x[MPC_VAR_T_CL] += t_cl_step;
-    }
-    state->origin_soc = soc;
-    state->origin_t_cl_degc = t_cl_degc;
-}
-
-void mpc_qp_linearise_cold(mpc_state *state)
-{
-    for (int32_t k = 0; k < MPC_STAGES; k++) {
-        state->stage[k].road.about_t_cl_degc = state->origin_t_cl_degc;
-        state->stage[k].road.about_fuel_g_per_s = DEPARTURE_FUEL_G_PER_S;
-        state->stage[k].road.about_p_eng_w = DEPARTURE_P_ENG_W;
-        state->stage[k].road.about_t_cl_start_degc = state->origin_t_cl_degc;
-        state->stage[k].road.about_t_cl_end_degc = state->origin_t_cl_degc;
-    }
-}
-
-/* The last plan, in SI units. alpha is taken at the mean temperature of a stage's own ends, for
- * demand classes at that of their block's: the class that is driven first in the plan is in reality
- * spread over the block. */
-void mpc_qp_linearise_about_plan(mpc_state *state)
-{
-    mpc_real start = real_clip(state->origin_t_cl_degc, COLDEST_DEGC, HOTTEST_DEGC);
-    for (int32_t k = 0; k < MPC_STAGES; k++) {
-        mpc_stage *const stage = &state->stage[k];
-        stage->road.about_t_cl_start_degc = start;
-        stage->road.about_t_cl_end_degc =
-            real_clip(state->origin_t_cl_degc + stage->x[MPC_VAR_T_CL], COLDEST_DEGC, HOTTEST_DEGC);
-        stage->road.about_t_cl_degc = REAL(0.5) * (start + stage->road.about_t_cl_end_degc);
-        /* no usable solution is beyond the upper bounds, corrupted memory may be */
-        stage->road.about_fuel_g_per_s = real_clip(stage->x[MPC_VAR_FUEL], REAL(0.0),
-                                                   LARGEST_PLAUSIBLE * mpc_par.unit_fuel_g_per_s);
-        stage->road.about_p_eng_w =
-            real_clip(stage->x[MPC_VAR_P_ENG], REAL(0.0), LARGEST_PLAUSIBLE * mpc_par.unit_power_w);
-        start = stage->road.about_t_cl_end_degc;
-    }
-    for (int32_t k = MPC_SHORT; k < MPC_STAGES; k += MPC_CLASSES) {
-        mpc_stage *const block = &state->stage[k];
-        const mpc_stage_road *const last = &block[MPC_CLASSES - 1].road;
-        const mpc_real mean = REAL(0.5)
-                              * (block[0].road.about_t_cl_start_degc + last->about_t_cl_end_degc);
-        for (int32_t i = 0; i < MPC_CLASSES; i++) {
-            block[i].road.about_t_cl_degc = mean;
-        }
-    }
-}
 
 static void scale_cost(mpc_state *state)
 {

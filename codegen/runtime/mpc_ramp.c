@@ -24,7 +24,7 @@ mpc_real mpc_ramp_least_w(const mpc_state *state)
         const mpc_real at_once_w = (road->net_w - gives_most_w) - risen_w;
         const mpc_real in_all_w = ((total_w / seconds) - gives_w) - (REAL(0.5) * risen_w);
         const mpc_real needed_w = real_max(at_once_w, in_all_w);
-        least_w = (road->duration_s > REAL(0.0)) ? real_max(least_w, needed_w) : least_w;
+        least_w = real_max(least_w, above(road->duration_s, REAL(0.0)) * needed_w);
     }
     return real_min(least_w, mpc_par.engine_max_w);
 }

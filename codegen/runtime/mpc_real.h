@@ -6,27 +6,42 @@
 #include <stdint.h>
 
 #include "mpc_config.h"
+#if MPC_COSTATE
+#include "mpc_elementary.h"
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+#endif
 
 #define REAL(literal) ((mpc_real)(literal))
 
 #if MPC_F32
 #define REAL_SQRT(x) sqrtf(x)
 #define REAL_POW(x, y) powf((x), (y))
-#define REAL_EXP(x) expf(x)
-#define REAL_EXPM1(x) expm1f(x)
-#define REAL_LOG1P(x) log1pf(x)
 #define REAL_ABS(x) fabsf(x)
 #define REAL_FMIN(a, b) fminf((a), (b))
 #define REAL_FMAX(a, b) fmaxf((a), (b))
 #else
 #define REAL_SQRT(x) sqrt(x)
 #define REAL_POW(x, y) pow((x), (y))
-#define REAL_EXP(x) exp(x)
-#define REAL_EXPM1(x) expm1(x)
-#define REAL_LOG1P(x) log1p(x)
 #define REAL_ABS(x) fabs(x)
 #define REAL_FMIN(a, b) fmin((a), (b))
 #define REAL_FMAX(a, b) fmax((a), (b))
+#endif
+
+#if MPC_COSTATE
+/* always the same work, also where the coolant's thermostat opens */
+#define REAL_EXP(x) mpc_fixed_exp(x)
+#define REAL_EXPM1(x) mpc_fixed_expm1(x)
+#define REAL_LOG1P(x) mpc_fixed_log1p(x)
+#elif MPC_F32
+#define REAL_EXP(x) expf(x)
+#define REAL_EXPM1(x) expm1f(x)
+#define REAL_LOG1P(x) log1pf(x)
+#else
+#define REAL_EXP(x) exp(x)
+#define REAL_EXPM1(x) expm1(x)
+#define REAL_LOG1P(x) log1p(x)
 #endif
 
 /* Without branches, so that time does not depend on data. With a NaN first and a number second the
@@ -35,10 +50,41 @@
 #if defined(MPC_NATIVE_MINMAX)
 static inline mpc_real real_min(mpc_real a, mpc_real b) { return REAL_FMIN(a, b); }
 static inline mpc_real real_max(mpc_real a, mpc_real b) { return REAL_FMAX(a, b); }
+#elif MPC_COSTATE && defined(__SSE2__)
+/* the instructions of x86 for the same, which gcc makes of it in some places alone */
+#if MPC_F32
+static inline mpc_real real_min(mpc_real a, mpc_real b)
+{
+    return _mm_cvtss_f32(_mm_min_ss(_mm_set_ss(a), _mm_set_ss(b)));
+}
+static inline mpc_real real_max(mpc_real a, mpc_real b)
+{
+    return _mm_cvtss_f32(_mm_max_ss(_mm_set_ss(a), _mm_set_ss(b)));
+}
+#else
+static inline mpc_real real_min(mpc_real a, mpc_real b)
+{
+    return _mm_cvtsd_f64(_mm_min_sd(_mm_set_sd(a), _mm_set_sd(b)));
+}
+static inline mpc_real real_max(mpc_real a, mpc_real b)
+{
+    return _mm_cvtsd_f64(_mm_max_sd(_mm_set_sd(a), _mm_set_sd(b)));
+}
+#endif
 #else
 static inline mpc_real real_min(mpc_real a, mpc_real b) { return (a < b) ? a : b; }
 static inline mpc_real real_max(mpc_real a, mpc_real b) { return (a > b) ? a : b; }
 #endif
+/* A choice by arithmetic, of which no compiler makes a branch: c is 1 or 0, the values are finite. */
+static inline mpc_real blend(mpc_real c, mpc_real yes, mpc_real no)
+{
+    return (c * yes) + ((REAL(1.0) - c) * no);
+}
+static inline mpc_real above(mpc_real a, mpc_real b) { return (a > b) ? REAL(1.0) : REAL(0.0); }
+static inline mpc_real not_below(mpc_real a, mpc_real b)
+{
+    return (a >= b) ? REAL(1.0) : REAL(0.0);
+}
 /* False for NaN, whatever the bounds. */
 static inline int32_t within(mpc_real x, mpc_real low, mpc_real high)
 {

@@ -6,6 +6,9 @@
 
 #include "mpc_config.h"
 #include "mpc_rows.h"
+#if MPC_COSTATE
+#include "mpc_costate.h"
+#else
 #if !MPC_SOLVER_OSQP
 #include "mpc_rows_factor.h"
 #endif
@@ -27,6 +30,7 @@ typedef struct {
     mpc_stage_factor factor;
 #endif
 } mpc_stage;
+#endif
 
 /* The iterate that a solve starts from, in SI units. */
 typedef struct {
@@ -100,8 +104,12 @@ typedef struct {
      * leave the digits of single precision to the changes within the plan. */
     mpc_real origin_soc;
     mpc_real origin_t_cl_degc;
-    mpc_real highest_floor_degc;      /* of any stage */
-    mpc_real cost;                    /* of the solver, in units per g */
+    mpc_real highest_floor_degc; /* of any stage */
+#if MPC_COSTATE
+    mpc_search search;
+#else
+    mpc_real cost; /* of the solver, in units per g */
+#endif
     mpc_real old_on_share[MPC_SHORT]; /* last usable plan */
     mpc_real old_p_eng_w[MPC_SHORT];
     mpc_real old_least_w;  /* of its first second, see mpc_ramp.c */

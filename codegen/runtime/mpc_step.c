@@ -25,7 +25,7 @@ static void set_defined(mpc_state *state)
     state->watch.good.t_cl_degc = mpc_par.t_cl_init_degc;
     state->watch.soc_since_s = LONG_AGO_S;
     state->watch.t_cl_since_s = LONG_AGO_S;
-    mpc_solver_claim(state);
+    mpc_method_claim(state);
 }
 
 void mpc_init(mpc_state *state) { set_defined(state); }
@@ -36,28 +36,22 @@ static void prepare(mpc_state *state)
     const mpc_measured *const good = &state->watch.good;
     if (state->phase == MPC_PHASE_COLD) {
         mpc_iterate_clear(state);
-        mpc_qp_move_origin(state, good->soc, good->t_cl_degc);
-        mpc_qp_linearise_cold(state);
+        mpc_stages_move_origin(state, good->soc, good->t_cl_degc);
+        mpc_stages_expand_cold(state);
     } else {
-        mpc_qp_move_origin(state, good->soc, good->t_cl_degc);
-        mpc_qp_linearise_about_plan(state);
+        mpc_stages_move_origin(state, good->soc, good->t_cl_degc);
+        mpc_stages_expand_about_plan(state);
     }
-#if MPC_LEARNING
-    mpc_learned_curve(state);
-#endif
     mpc_floor_find(state, good->soc);
-    mpc_qp_update(state);
     mpc_iterate_keep(state);
-    mpc_iterate_to_solver_units(state);
-    mpc_solver_start(state);
+    mpc_method_start(state);
 }
 
 /* Convert the iterate back to SI units; returns whether it is usable. If not, the solver is cold:
  * nothing of a failed solve is kept. */
 static int32_t conclude(mpc_state *state, int32_t solved)
 {
-    const int32_t usable = solved & mpc_iterate_usable(state);
-    mpc_iterate_to_si_units(state);
+    const int32_t usable = mpc_method_finish(state, solved);
     state->phase = (usable != 0) ? MPC_PHASE_RUNNING : MPC_PHASE_COLD;
     if (usable == 0) {
         state->solves = 0;
@@ -74,14 +68,14 @@ static void depart_slice(mpc_state *state, const mpc_in *in)
 {
     int32_t count = MPC_ITERATIONS;
     if (state->phase != MPC_PHASE_DEPARTING) {
-        mpc_qp_road(state, in);
+        mpc_stages_take(state, in);
         state->road_age = 0;
         prepare(state);
         state->phase = MPC_PHASE_DEPARTING;
         state->depart_left = MPC_DEPARTURE_ITERATIONS;
         count = ((MPC_DEPARTURE_ITERATIONS - 1) % MPC_ITERATIONS) + 1;
     }
-    const int32_t solved = mpc_solver_iterate(state, count);
+    const int32_t solved = mpc_method_iterate(state, count);
     const int32_t goes_on = ((solved != 0) && (state->depart_left > count)) ? 1 : 0;
     state->depart_left = (goes_on != 0) ? (state->depart_left - count) : 0;
     if (state->depart_left == 0) {
@@ -144,12 +138,12 @@ static void move_on(mpc_state *state, int32_t passed)
 static int32_t take_preview(mpc_state *state, const mpc_in *in, int32_t passed, int32_t *flags)
 {
     if (mpc_preview_check(&state->heard, in, passed) != 0) {
-        mpc_qp_road(state, in);
+        mpc_stages_take(state, in);
         state->road_age = 0;
     } else {
         *flags |= MPC_BAD_PREVIEW;
         if (((state->road_age + passed) < MPC_SHORT) && (mpc_preview_check_kept(state) != 0)) {
-            mpc_qp_road_move_up(state, passed);
+            mpc_stages_move_up(state, passed);
             state->road_age += passed;
         } else {
             state->road_age = MPC_NO_PLAN;
@@ -171,7 +165,7 @@ static int32_t solve(mpc_state *state)
     const int32_t solves = state->solves;
     prepare(state);
     const int32_t usable =
-        conclude(state, mpc_solver_iterate(state, MPC_ITERATIONS) & MPC_SOLVER_MAY_SUCCEED);
+        conclude(state, mpc_method_iterate(state, MPC_ITERATIONS) & MPC_SOLVER_MAY_SUCCEED);
     if (usable != 0) {
         state->failures = 0;
     } else {
@@ -195,14 +189,8 @@ static void keep_plan(mpc_state *state)
             state->old_fast_s = k;
         }
         state->old_arrival_s += (state->stage[k].road.duration_s > REAL(0.0)) ? 1 : 0;
-        state->old_on_share[k] = state->stage[k].x[MPC_VAR_ON];
-        state->old_p_eng_w[k] = state->stage[k].x[MPC_VAR_P_ENG];
     }
-    const mpc_real on_share = state->old_on_share[0];
-    if (on_share >= ON_THRESHOLD) {
-        const mpc_real share = real_min(on_share, REAL(1.0));
-        state->old_p_eng_w[0] = share * mpc_polish_power_w(state, state->old_p_eng_w[0] / share);
-    }
+    mpc_method_plan(state, state->old_on_share, state->old_p_eng_w);
     state->old_least_w = mpc_ramp_least_w(state);
     state->old_age = 0;
 }
@@ -235,8 +223,8 @@ int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out)
         } else {
             is_new = 1;
             keep_plan(state);
-            out->on_share = state->stage[0].x[MPC_VAR_ON];
-            out->relaxation_gap = mpc_qp_relaxation_gap(state);
+            out->on_share = state->old_on_share[0];
+            mpc_method_report(state, out);
         }
     }
     if ((state->old_age <= MPC_PLAN_VALID_STEPS) && (state->old_age < MPC_SHORT)) {
@@ -249,24 +237,6 @@ int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out)
     out->engine_on = command.engine_on;
     out->p_eng_w = command.p_eng_w;
     return out->flags;
-}
-
-void mpc_plan(const mpc_state *state, mpc_real *x, mpc_real *duals)
-{
-    for (int32_t k = 0; k < MPC_STAGES; k++) {
-        const mpc_stage *const stage = &state->stage[k];
-        const int32_t in_si = (state->phase == MPC_PHASE_DEPARTING) ? 0 : 1;
-        for (int32_t i = 0; i < MPC_VARS; i++) {
-            const mpc_real unit = (in_si != 0) ? REAL(1.0) : stage->column[i];
-            x[(k * MPC_VARS) + i] = stage->x[i] * unit;
-        }
-        x[(k * MPC_VARS) + MPC_VAR_SOC] += state->origin_soc;
-        x[(k * MPC_VARS) + MPC_VAR_T_CL] += state->origin_t_cl_degc;
-        for (int32_t i = 0; i < MPC_ROWS; i++) {
-            const mpc_real unit = (in_si != 0) ? REAL(1.0) : (stage->row[i] / state->cost);
-            duals[(k * MPC_ROWS) + i] = stage->y[i] * unit;
-        }
-    }
 }
 
 int32_t mpc_abi(int32_t entry)

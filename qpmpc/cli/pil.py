@@ -9,12 +9,14 @@ from qpmpc.cli.options import CycleArgument, JsonOption, OutOption, SetOption, V
 
 if TYPE_CHECKING:
     from qpmpc.codegen.generate import Algorithm, Precision
+    from qpmpc.codegen.method import Generated
     from qpmpc.controllers.settings import ControllerSettings
     from qpmpc.trip import Trip
 
 
 def pil(
     cycle: CycleArgument,
+    controller: Annotated[str, typer.Option(metavar="NAME", help="mh-qp or mh-costate.")] = "mh-qp",
     target: Annotated[str, typer.Option(metavar="TARGET", help="cortex-m7.")] = "cortex-m7",
     precision: Annotated[
         str | None,
@@ -24,9 +26,7 @@ def pil(
     ] = None,
     algorithm: Annotated[
         str | None,
-        typer.Option(
-            metavar="admm|osqp", help="Of the firmware; default: admm.", show_default=False
-        ),
+        typer.Option(metavar="admm|osqp", help="Of mh-qp; default: admm.", show_default=False),
     ] = None,
     pareto: Annotated[
         bool,
@@ -53,15 +53,23 @@ def pil(
 
       qpmpc pil nedc-truncated --set mh_qp.admm.iterations=25 --out results/pil
 
+      qpmpc pil nycc --controller mh-costate
+
       qpmpc pil nycc --pareto --out results/pil
     """
     from qpmpc.cli.inputs import check_outputs, load_vehicle_and_settings
     from qpmpc.codegen.firmware import require_tools
     from qpmpc.codegen.generate import ALGORITHMS, PRECISIONS, one_of
+    from qpmpc.codegen.method import GENERATED
+    from qpmpc.errors import InputError
     from qpmpc.registry import check_controllers
     from qpmpc.trip import Trip
 
     one_of(target, ("cortex-m7",), "target")
+    name = one_of(controller, GENERATED, "generated controller")
+    if name != "mh-qp" and (algorithm is not None or pareto):
+        option = "--pareto" if pareto else "--algorithm"
+        raise InputError(f"{option} is for mh-qp alone, not for {name}: leave it out")
     precisions = PRECISIONS if precision is None else (one_of(precision, PRECISIONS, "precision"),)
     algorithms = ALGORITHMS if algorithm is None else (one_of(algorithm, ALGORITHMS, "algorithm"),)
     car, settings = load_vehicle_and_settings(vehicle, set_)
@@ -73,12 +81,13 @@ def pil(
     if pareto:
         _pareto(trip, settings, precisions, algorithms, json_file, out)
     else:
-        _one_run(trip, settings, precisions[0], algorithms[0], json_file, out)
+        _one_run(trip, settings, name, precisions[0], algorithms[0], json_file, out)
 
 
 def _one_run(
     trip: "Trip",
     settings: "ControllerSettings",
+    controller: "Generated",
     precision: "Precision",
     algorithm: "Algorithm",
     json_file: Path | None,
@@ -89,8 +98,8 @@ def _one_run(
     from qpmpc.codegen.pil.report import pil_lines, write_pil
 
     with progress_bar(1) as bar:
-        report = bar.next_job(f"{trip.cycle.name}, firmware {algorithm} {precision}")
-        result = processor_in_the_loop(trip, settings, precision, report, algorithm)
+        report = bar.next_job(f"{trip.cycle.name}, firmware of {controller} {precision}")
+        result = processor_in_the_loop(trip, settings, precision, report, algorithm, controller)
     write_json(result.summary(), json_file)
     console = result_console(json_file)
     for line in (*pil_lines(result), *trip.remarks):

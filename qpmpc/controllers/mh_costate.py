@@ -1,7 +1,7 @@
 """`mh-costate`: plans by costates of SOC and coolant on the true curves; see docs/costate.md."""
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,13 +40,27 @@ class MhCostateSettings(BaseModel):
     limits : terminal band and margins, as of `mh_qp.qp`; it comes nearer to a limit than an
         iteration that is stopped, and needs less of a margin to it
     rounds : Newton rounds of a second
+    implementation : as of `mh_qp`
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     horizon: HorizonSettings = HorizonSettings(blocks=20)
     limits: LimitSettings = LimitSettings(t_cl_margin_k=0.1)
-    rounds: Annotated[int, Field(ge=1, le=1000)] = 8
+    rounds: Annotated[int, Field(ge=1, le=1000)] = 5
+    implementation: Literal["auto", "c", "python"] = "auto"
+
+
+def unit_g(model: PwaModel) -> float:
+    """Return the fuel that charges the whole battery, with the engine at its best, g."""
+    line = model.line
+    best_g_per_j = float((line.fuel_g_per_s[1:] / line.power_w[1:]).min())
+    return best_g_per_j * model.battery_energy_j
+
+
+def most_charge_g(model: PwaModel) -> float:
+    """Return the largest lambda allowed, g."""
+    return MOST_CHARGE * unit_g(model)
 
 
 @dataclass(frozen=True)
@@ -97,13 +111,12 @@ class MhCostate(Planner):
         vehicle = trip.vehicle
         self.preview = trip.preview(own.horizon)
         self.model = PwaModel.of(vehicle)
-        self.programs = ProgramBuilder(vehicle, self.model, self.preview.count, own.limits)
+        self.programs = ProgramBuilder(
+            vehicle, self.model, self.preview.count, own.limits, own.horizon
+        )
         self._ramp = RampFloor(vehicle)
         self._shift = self.preview.shift()
         self._shortest = Shortest.of(vehicle.engine)
-        line = self.model.line
-        best_g_per_j = float((line.fuel_g_per_s[1:] / line.power_w[1:]).min())
-        self._unit_g = best_g_per_j * self.model.battery_energy_j
         self.last: CostatePlan | None = None
         self._last_step = 0
 
@@ -163,7 +176,7 @@ class MhCostate(Planner):
 
     def _cold(self, t_cl_degc: float) -> tuple[Linearisation, Multipliers]:
         n = self.preview.count
-        charge = np.full(n, COLD_CHARGE * self._unit_g)
+        charge = np.full(n, COLD_CHARGE * unit_g(self.model))
         return Linearisation.constant(n, t_cl_degc), Multipliers(charge, np.zeros(n))
 
     def _solve(
@@ -175,7 +188,7 @@ class MhCostate(Planner):
         rounds: int,
     ) -> CostatePlan:
         program = self.programs.at(stages, seen.soc, seen.t_cl_degc, about, seen.engine_on)
-        found = newton(program, start, rounds, MOST_CHARGE * self._unit_g)
+        found = newton(program, start, rounds, most_charge_g(self.model))
         layout = Layout.of(stages, self._horizon, self._shortest, seen.engine_for_s)
         exact = StageCosts.of(program, found.at, program.curves)
         costs = found.costs.with_first(layout.short, exact)

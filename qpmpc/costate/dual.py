@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from qpmpc.costate.curves import Curves
 from qpmpc.costate.funnel import funnel
 from qpmpc.costate.program import Program
-from qpmpc.costate.stage import Least, least
+from qpmpc.costate.stage import Least, least, least_convex
 
 Floats = NDArray[np.float64]
 
@@ -17,8 +17,8 @@ Floats = NDArray[np.float64]
 # they cost, through it.
 SWITCH_G_PER_S, LONG_SWITCH_G_PER_S = 0.03, 0.05
 START_SWITCH_G_PER_S, START_LONG_SWITCH_G_PER_S = 0.01, 0.015
-LEAST_SWITCH_G = 1e-9  # of a masked stage
-NO_CHOICE_G = 1e3  # as good as any cost, where the engine must run or must not
+LEAST_SWITCH_G = 1e-4  # of a masked stage
+START_HALF_STEPS = 4  # of the funnel, half of those a stage has
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,8 @@ class StageCosts:
         p = program
         nu = coolant_costate(p, at.heat)
         price_internal = at.charge * p.charge_per_w
-        on = least(
+        minimised = least_convex if curves is p.shared else least
+        on = minimised(
             curves,
             p.net_w,
             p.low_w,
@@ -178,14 +179,16 @@ def dual(program: Program, at: Multipliers) -> Dual:
     width = np.maximum(width, LEAST_SWITCH_G)
     free = p.can & ~p.must
     difference = np.where(free, costs.on_cost, 0.0) - np.where(free, costs.off_cost, 0.0)
-    difference = np.where(free, difference, np.where(p.must, -NO_CHOICE_G, NO_CHOICE_G))
-    rest, starts_g, starts = 0.0, np.zeros_like(width), np.zeros_like(width)
+    starts_g, starts = np.zeros_like(width), np.zeros_like(width)
     if p.has_start:
         start_price = np.maximum(costs.start_cost, 0.0) * p.rises
         low, high = np.minimum(start_price, 0.0), np.maximum(start_price, 0.0)
+        # beyond it no start is worth it: as good as must or must not, and as no larger difference
+        decided = width + np.abs(start_price) + np.abs(np.append(start_price[1:], 0.0))
+        difference = np.where(free, np.clip(difference, -decided, decided), difference)
+        difference = np.where(free, difference, np.where(p.must, -decided, decided))
         edge = _start_prices(width, difference, low, high, p.starts_on)
         starts_g = edge - np.append(edge[1:], 0.0)
-        rest = -float(edge[0]) * p.starts_on
     share = np.clip(0.5 - (difference + starts_g) / width, 0.0, 1.0)
     share = np.where(free, share, np.where(p.must, 1.0, 0.0))
     if p.has_start:
@@ -194,7 +197,7 @@ def dual(program: Program, at: Multipliers) -> Dual:
     on_part = np.where(share > 0.0, share * np.where(p.can, costs.on_cost, 0.0), 0.0)
     off_part = np.where(share < 1.0, (1.0 - share) * np.where(p.must, 0.0, costs.off_cost), 0.0)
     stages_g = on_part + off_part + share * starts_g + 0.5 * width * (share**2 - share)
-    value = float(stages_g.sum()) + rest + constant_part(p, at, costs.nu)
+    value = float(stages_g.sum()) + constant_part(p, at, costs.nu)
     on = costs.on
     v_charge = p.charge_per_w * on.ratio
     v_heat = p.per_fuel * on.slope_g_per_j - p.per_power
@@ -225,15 +228,20 @@ def _start_prices(
 ) -> Floats:
     """Prices e_k of sigma_k - sigma_k-1, shape (n,).
 
-    With sigma_k = 1/2 - (J_on - J_off + e_k - e_k+1) / W_k the sum of W sigma up to stage k is
-    known but for e_k+1, which lies between its limits: a funnel with W as response.
+    sigma_k = 1/2 - (J_on - J_off + e_k - e_k+1) / W_k, so that e_k+1 is a running sum of
+    J_on - J_off - W / 2 + W sigma, between its limits: a funnel with W as response.
     """
     first = 0.0 if on_now else float(high[0])
-    known = np.cumsum(0.5 * width - difference) - first
     after_low, after_high = np.append(low[1:], 0.0), np.append(high[1:], 0.0)
-    share = funnel(np.zeros_like(width), width, known + after_low, known + after_high, 0.0)
-    edge = np.cumsum(width * share) - known
-    return np.append(first, np.clip(edge[:-1], after_low[:-1], after_high[:-1]))
+    offset = difference - 0.5 * width
+    offset[0] += first
+    share = funnel(offset, width, after_low, after_high, steps=START_HALF_STEPS * len(width) // 2)
+    edge, edges = 0.0, [first]
+    terms = zip(offset, width * share, after_low, after_high, strict=True)
+    for known, more, at_least, at_most in terms:
+        edge = min(max(edge + known + more, at_least), at_most)
+        edges.append(edge)
+    return np.array(edges[:-1])
 
 
 def _states(

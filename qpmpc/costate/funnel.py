@@ -1,73 +1,136 @@
 """A running sum kept within limits at least cost: the prices of its terms, in one walk.
 
 The charge of the battery, the heat of the coolant and the starts of the engine are all of this
-form; see docs/costate.md.
+form; see docs/costate.md. The generated C takes the same steps in the same order
+(`mpc_costate_funnel.c`), as many of them as are allowed, always.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-LEAST_RESPONSE = 1e-300  # below it a limit cannot be met by any price
-TIE = 1e-12  # relative
+LEAST_RESPONSE = 1e-20  # below it a limit cannot be met by any price
+UNLIMITED = 1e30  # a price beyond any
+TIE = 1e-12  # of prices, relative; single precision has its own
 
 
 def funnel(
-    offset: Floats, response: Floats, low: Floats, high: Floats, start: float, target: float = 0.0
+    offset: Floats,
+    response: Floats,
+    low: Floats,
+    high: Floats,
+    decay: Floats | None = None,
+    *,
+    steps: int,
 ) -> Floats:
     """Return the price of each term of a running sum.
 
     The terms are offset_k + response_k p_k, those of
 
-        min  sum_k 1/2 response_k (p_k - target)^2   subject to   low_k <= x_k <= high_k,
-        x_k = x_{k-1} + offset_k + response_k p_k,   x_0 = start.
+        min  sum_k 1/2 response_k p_k^2   subject to   low_k <= x_k <= high_k,
+        x_k = d_k x_{k-1} + offset_k + response_k p_k,   x before the first = 0.
 
-    A price is the same from term to term, and `target` after the last, but falls where the sum is
-    at a lower limit and rises where it is at an upper one. So along a stretch of one price every
-    limit is an interval of prices. Walked forward, the interval [L, U] that meets all limits so far
-    is kept; where a new limit empties it, the stretch ends at the limit that made U (or L), which
-    fixes its price, and the walk starts again from there. A limit that no price can move is passed
-    over.
+    The price d_k p_k = p_{k-1} goes on from term to term, and is 0 after the last, but falls where
+    the sum is at a lower limit and rises where it is at an upper one. So along a stretch of one
+    price every limit is an interval of prices. Walked forward, the interval [L, U] that meets all
+    limits so far is kept; where a new limit empties it, the stretch ends at the limit that made U
+    (or L), which fixes its price, and the walk starts again from there. A limit that no price can
+    move is passed over. The stretch ends at once where a limit leaves one price alone. Where the
+    steps do not suffice the last stretch has the price that meets the limits seen.
 
     Parameters
     ----------
     offset, response, low, high : shape (n,); response >= 0, low <= high
-    start, target : as above
+    decay : d_k > 0, shape (n,); 1 if None
+    steps : of the walk; going back to where a stretch ends costs some
 
     Returns
     -------
     p, shape (n,)
     """
     count = len(offset)
-    price = np.empty(count)
-    first, here = 0, start
-    while first < count:
-        at_zero = here + np.cumsum(offset[first:])
-        moves = np.cumsum(response[first:])
+    decays = np.ones(count) if decay is None else decay
+    # one term more, whose limit is the price 0: where that is met, the walk ends
+    terms = zip(
+        [*offset.tolist(), 0.0],
+        [*response.tolist(), 1.0],
+        [*low.tolist(), 0.0],
+        [*high.tolist(), 0.0],
+        [*decays.tolist(), 0.0],
+        [*(1.0 / decays).tolist(), 1.0],
+        strict=True,
+    )
+    ends = _ends([Term(*term) for term in terms], steps)
+    price, found = 0.0, []
+    for k in range(count - 1, -1, -1):
+        price = ends.get(k, price)
+        found.append(price)
+        price *= decays[k]
+    return np.array(found[::-1])
+
+
+class Term(NamedTuple):
+    """A term, its limits, and how x and its price go on to it."""
+
+    offset: float
+    response: float
+    low: float
+    high: float
+    decay: float
+    per_decay: float
+
+
+class Bound(NamedTuple):
+    """A bound of a stretch's price, where it was made: the price there, and x."""
+
+    at: int
+    price: float
+    x: float
+
+
+NO_BOUND = Bound(0, 0.0, 0.0)
+
+
+def _ends(terms: list[Term], steps: int) -> dict[int, float]:
+    """Prices of the stretches, each at its last term."""
+    last = len(terms) - 1
+    ends: dict[int, float] = {}
+    k, x, moves = 0, 0.0, 0.0
+    least, most = -UNLIMITED, UNLIMITED  # L, U at the price of the present term
+    of_least = of_most = NO_BOUND
+    for _ in range(steps):
+        term = terms[k]
+        x = term.decay * x + term.offset
+        moves = term.decay * term.decay * moves + term.response
+        least = max(least * term.per_decay, -UNLIMITED)
+        most = min(most * term.per_decay, UNLIMITED)
         movable = moves > LEAST_RESPONSE
-        per = np.where(movable, moves, 1.0)
-        least = np.where(movable, (low[first:] - at_zero) / per, -np.inf)
-        most = np.where(movable, (high[first:] - at_zero) / per, np.inf)
-        low_price = np.maximum.accumulate(least)
-        high_price = np.minimum.accumulate(most)
-        gap = low_price - high_price
-        empty = np.flatnonzero(gap > TIE * np.maximum(np.abs(low_price), np.abs(high_price)))
-        if len(empty):
-            at = int(empty[0])
-            from_low = bool(most[at] < low_price[at])
-            p = low_price[at - 1] if from_low else high_price[at - 1]
-            upto = at
+        per_move = 1.0 / max(moves, LEAST_RESPONSE)
+        low = (term.low - x) * per_move if movable else -UNLIMITED
+        high = (term.high - x) * per_move if movable else UNLIMITED
+        own_low, own_high = Bound(k, low, term.low), Bound(k, high, term.high)
+        end = None
+        if least > high + TIE * abs(high):
+            end = of_least
+        elif low - TIE * abs(low) > most:
+            end = of_most
         else:
-            upto = count - first
-            p = min(max(target, low_price[-1]), max(high_price[-1], low_price[-1]))
-            if p == target:
-                price[first:] = p
-                break
-            from_low = p > target
-        reached = (least if from_low else most)[:upto]
-        contact = upto - 1 - int(reached[::-1].argmax() if from_low else reached[::-1].argmin())
-        price[first : first + contact + 1] = p
-        here = float((low if from_low else high)[first + contact])
-        first += contact + 1
-    return price
+            if low >= least:
+                least, of_least = low, own_low
+            if high <= most:
+                most, of_most = high, own_high
+            if least >= most:  # one price alone is left
+                end = own_low if of_least is own_low else own_high
+        if end is None:
+            k += 1
+            continue
+        ends[end.at] = end.price
+        k, x, moves, least, most = end.at + 1, end.x, 0.0, -UNLIMITED, UNLIMITED
+        if k > last:
+            break
+    else:
+        ends.setdefault(last - 1, max(least, min(most, 0.0)))
+    return ends

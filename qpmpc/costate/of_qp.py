@@ -33,7 +33,7 @@ class QpCertificate:
     """
 
     def __init__(self, qp: StageQp, horizon: HorizonSettings) -> None:
-        self._programs = ProgramBuilder(qp.vehicle, qp.model, qp.stages, qp.settings)
+        self._programs = ProgramBuilder(qp.vehicle, qp.model, qp.stages, qp.settings, horizon)
         self._rows, self._horizon = qp.rows, horizon
         self._shortest = Shortest.of(qp.vehicle.engine)
 

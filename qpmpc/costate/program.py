@@ -7,8 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.costate.curves import Curves
+from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
+from qpmpc.qp.expressions import code_of, parsed, targets_of
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.quantities import Quantities
 from qpmpc.qp.scaling import ScalingSettings
@@ -18,6 +20,23 @@ from qpmpc.vehicle.must_run import must_run
 from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
+
+# Numbers of a stage from those of the QP's table, in numpy and in C; see `Program`.
+TAKEN = ["growing", "room_w", "per_fuel", "per_power", "soc_low", "soc_high"]
+PROGRAM = """
+fuel_cost = duration_s * alpha
+charge_per_w = duration_s / battery_energy_j
+t_end = 1.0 + per_end
+t_before = per_end - per_start
+settled = settled_k
+low_w = max(engine_min_w, min(missing_w, engine_max_w))
+high_w = max(min(engine_max_w, room_w), low_w)
+t_low = floor_degc - origin_t_cl_degc
+t_high = t_max_degc - origin_t_cl_degc
+start_k = per_power * lhv_j_per_g * start_fuel_g / max(duration_s, SHORTEST_SCALE_S)
+"""
+MADE = [target for line in parsed(PROGRAM) for target in targets_of(line)]
+_PROGRAM_CODE = code_of(parsed(PROGRAM))
 
 
 @dataclass(frozen=True)
@@ -37,6 +56,8 @@ class Program:
     ----------
     curves : of the seconds ahead, the true ones
     shared : of longer stages, with the convex envelope of the fuel curve
+    short, classes : number of seconds ahead, and of stages of a block
+    charge_per_w : SOC that a watt out of the store takes in each stage, h / E_bat
     price_t : cost of a kelvin at the end of each stage, of its own and of the next one's `growing`
     low_w, high_w : limits of E
     must, can : whether the engine has to run, and whether it may
@@ -48,10 +69,12 @@ class Program:
 
     curves: Curves
     shared: Curves
+    short: int
+    classes: int
     duration_s: Floats
     net_w: Floats
     off_w: Floats
-    per_soc_j: float
+    charge_per_w: Floats
     fuel_cost: Floats
     per_fuel: Floats
     per_power: Floats
@@ -81,11 +104,6 @@ class Program:
         """Whether a start costs anything."""
         return self.start_fuel_g > 0.0 or self.cranking_soc > 0.0
 
-    @property
-    def charge_per_w(self) -> Floats:
-        """SOC that a watt out of the store takes in each stage, h / E_bat."""
-        return self.duration_s / self.per_soc_j
-
 
 class ProgramBuilder:
     """Makes the program of each second of a trip, by the numbers of the QP's table.
@@ -95,12 +113,18 @@ class ProgramBuilder:
     vehicle, model : of the plant
     stages : n
     limits : the terminal band and margins
+    layout : of the stages
     """
 
     def __init__(
-        self, vehicle: Vehicle, model: PwaModel, stages: int, limits: LimitSettings
+        self,
+        vehicle: Vehicle,
+        model: PwaModel,
+        stages: int,
+        limits: LimitSettings,
+        layout: HorizonSettings,
     ) -> None:
-        self._vehicle = vehicle
+        self._vehicle, self._layout = vehicle, layout
         settings = QpSettings(**limits.model_dump(include=set(LimitSettings.model_fields)))
         self._parameters = qp_parameters(vehicle, model, settings, ScalingSettings())
         self._quantities = Quantities(self._parameters, vehicle, model, stages)
@@ -117,6 +141,7 @@ class ProgramBuilder:
     ) -> Program:
         """Return the program of a horizon and a state, expanded about a plan."""
         names = self._quantities.update(stages, soc, about, engine_on)
+        exec(_PROGRAM_CODE, names)
         number = self._parameters
         count = len(stages.duration_s)
 
@@ -124,45 +149,28 @@ class ProgramBuilder:
             of_stage: Any = names[name]
             return np.array(np.broadcast_to(of_stage, (count, 1))[:, 0])
 
-        vehicle, engine = self._vehicle, self._vehicle.engine
-        net, missing = stages.net_w, value("missing_w")
-        low = np.maximum(engine.power_min_w, np.minimum(missing, engine.power_max_w))
-        most = np.minimum(engine.power_max_w, net + vehicle.battery_charge_max_w)
-        must = must_run(vehicle, net, stages.speed_mps)
-        growing = value("growing")
+        of = {name: value(name) for name in (*TAKEN, *MADE)}
+        growing, room_w = of.pop("growing"), of.pop("room_w")
+        must = must_run(self._vehicle, stages.net_w, stages.speed_mps)
         price_t = growing.copy()
         price_t[:-1] += growing[1:]
-        per_power, per_fuel = value("per_power"), value("per_fuel")
-        second_s = np.maximum(stages.duration_s, 1.0)
-        soc_low, soc_high = value("soc_low"), value("soc_high")
         return Program(
             curves=self._curves,
             shared=self._shared,
+            short=self._layout.short_stages,
+            classes=self._layout.classes,
             duration_s=stages.duration_s,
-            net_w=net,
+            net_w=stages.net_w,
             off_w=stages.internal_off_w,
-            per_soc_j=number["battery_energy_j"],
-            fuel_cost=stages.duration_s * value("alpha"),
-            per_fuel=per_fuel,
-            per_power=per_power,
-            t_end=1.0 + value("per_end"),
-            t_before=value("per_end") - value("per_start"),
-            settled=value("settled_k"),
             price_t=price_t,
-            low_w=low,
-            high_w=np.maximum(most, low),
             must=must,
-            can=must | (most >= engine.power_min_w),
-            soc_low=soc_low,
-            soc_high=soc_high,
-            t_low=value("floor_degc"),
-            t_high=np.full(count, number["t_max_degc"]),
+            can=must | (room_w >= number["engine_min_w"]),
             slack_g_per_k=number["slack_g_per_k"],
             start_fuel_g=number["start_fuel_g"],
             cranking_soc=number["cranking_j"] / number["battery_energy_j"],
-            start_k=per_power * number["lhv_j_per_g"] * number["start_fuel_g"] / second_s,
             starts_on=engine_on,
             rises=stages.rises,
             soc=soc,
             t_cl_degc=t_cl_degc,
+            **of,
         )

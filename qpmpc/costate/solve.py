@@ -1,23 +1,28 @@
 """Rounds of Newton on the dual, each with all limits solved exactly by two funnels."""
 
 from collections.abc import Callable
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
+from qpmpc.costate.curves import Curves
 from qpmpc.costate.dual import Dual, Multipliers, dual, with_signs
 from qpmpc.costate.funnel import funnel
 from qpmpc.costate.program import Program
 
 Floats = NDArray[np.float64]
 
-SWEEPS = 2  # of SOC and coolant in a round
+CHARGE_HALF_STEPS, HEAT_HALF_STEPS = 6, 3  # of the funnels, half of those a term has
+LEAST_RISE_G = 1e-7  # of the dual: less is as good as none
 BACKGROUND = 0.05  # share of a switch's curvature that a stage has that does not respond now
-SOFTENED = 10  # sets of limits that may be given up in a sweep, because their slack is cheaper
 MODERATE = 0.15  # of the engine's power
 LEAST_DECAY = 0.02  # of the coolant over a stage, in the search alone
-SHARES = (1.0, 0.4, 0.1, 0.02)  # of the way to the aim that are tried, and if the first is good
-BEYOND = 4.0
+AT_SLACK = 0.999  # of the slack's price: from there on a coolant limit is given up
+# Of the way to the aim: the part that is tried first, and what becomes of it where the dual rose
+# there, or did not.
+FIRST_SHARE, MOST_SHARE, GROWS, SHRINKS = 1.0, 16.0, 2.0, 0.25
+STREAK = 3  # rounds in a row that have to rise before more than the whole way is tried
 
 
 def newton(
@@ -29,114 +34,88 @@ def newton(
 ) -> Dual:
     """Return the dual after some rounds.
 
-    A round aims at the solution of the linearised problem and goes there as far as the dual's
-    value, which is a lower bound on the program, rises: no step size has to be chosen.
+    A round aims at the solution of the linearised problem and tries one point on the way there, or
+    beyond it: it goes there if the dual's value, which is a lower bound on the program, is higher.
+    The next round tries the same part of its way or more, else less. So no step size has to be
+    chosen, and every round is the same work.
 
     Parameters
     ----------
     program : of the second
     start : multipliers to begin at
-    rounds : number of rounds, with up to `len(SHARES)` evaluations each
+    rounds : number of rounds, with one evaluation each
     most_charge : largest lambda allowed, g
     on_round : called with the dual before each round
     """
     here = dual(program, start)
+    share, streak = FIRST_SHARE, 0
     for _ in range(rounds):
         if on_round is not None:
             on_round(here)
-        there = _ahead(program, here, aim(program, here, most_charge))
-        if there is None:
-            break
-        here = there
+        goal = aim(program, here, most_charge)
+        there = dual(program, with_signs(here.at.towards(goal, share), program.slack_g_per_k))
+        if there.value - here.value > LEAST_RISE_G:
+            here, streak = there, min(streak + 1, STREAK)
+            if streak == STREAK or share < 1.0:
+                share = min(GROWS * share, MOST_SHARE)
+        else:
+            share, streak = SHRINKS * min(share, 1.0), 0
     return here
 
 
-def _ahead(program: Program, here: Dual, goal: Multipliers) -> Dual | None:
-    """Return the dual on the way to the aim, or beyond it, where it is higher; None if nowhere."""
-    for share in SHARES:
-        there = dual(program, here.at.towards(goal, share))
-        if there.value > here.value:
-            break
-    else:
-        return None
-    if share == SHARES[0]:
-        beyond = here.at.towards(goal, BEYOND)
-        further = dual(program, with_signs(beyond, program.slack_g_per_k))
-        if further.value > there.value:
-            return further
-    return there
+def moderate(curves: Curves) -> tuple[float, float]:
+    """Return a moderate power of the engine, W, and the fuel that it takes, g/s."""
+    power_w = MODERATE * curves.end_w[-1:]
+    return float(power_w[0]), float(curves.fuel_g_per_s(power_w)[0])
 
 
 def aim(program: Program, here: Dual, most_charge: float) -> Multipliers:
-    """Solve the problem linearised at a point, by sweeps of SOC and coolant."""
+    """Solve the problem linearised at a point, first for SOC, then for the coolant."""
     p, at = program, here.at
     # of a stage that does not respond now: of switching an engine at a moderate power
-    moderate_w = MODERATE * p.curves.end_w[-1:]
-    fuel = p.curves.fuel_g_per_s(moderate_w)
+    moderate_w, fuel = moderate(p.curves)
     background = BACKGROUND / here.width
     of_charge = here.charge_curvature + background * (p.charge_per_w * moderate_w) ** 2
     warms = p.per_fuel * fuel - p.per_power * moderate_w
     of_heat = here.heat_curvature + background * warms**2
-    charge, heat = at.charge, at.heat
-    change = np.diff(here.soc, prepend=p.soc)
-    moved = np.zeros_like(change)  # of nu
-    coolant = _Coolant(p, here)
-    for _ in range(SWEEPS):
-        offset = change - of_charge * at.charge + here.cross_curvature * moved
-        charge = funnel(offset, of_charge, p.soc_low, p.soc_high, p.soc)
-        charge = np.clip(charge, 0.0, most_charge)
-        heat = coolant.heat(of_heat, here.cross_curvature * (charge - at.charge))
-        moved = coolant.moved(heat - at.heat)
-    return Multipliers(charge, heat)
+    # SOC is limited in each second and at the end of each block, so a block is one term
+    first = np.append(np.arange(p.short), np.arange(p.short, len(of_charge), p.classes))
+    last = np.append(first[1:], len(of_charge)) - 1
+    low, high = (p.soc_low - here.soc)[last], (p.soc_high - here.soc)[last]
+    response, offset = (np.add.reduceat(x, first) for x in (of_charge, -of_charge * at.charge))
+    price = funnel(offset, response, low, high, steps=CHARGE_HALF_STEPS * len(first) // 2)
+    charge = np.repeat(np.clip(price, 0.0, most_charge), last + 1 - first)
+    return Multipliers(charge, _heat(p, here, of_heat, charge))
 
 
-class _Coolant:
-    """The coolant as a running sum x = T / phi, with phi the product of the decays.
+def _heat(program: Program, here: Dual, of_heat: Floats, charge: Floats) -> Floats:
+    """Return multipliers of the coolant limits, given lambda.
 
-    In it the price M = nu t_end phi is the same from stage to stage, but for a known part of
-    `price_t` and where a limit binds.
+    How much T_k moves is a running sum, with the decay of a stage. Its price is
+    M_k = nu_k t_end_k, but for a known part of `price_t`. A limit whose multiplier is the price of
+    its slack, and is not kept all the same, is a limit no more.
     """
+    p, slack, heat = program, program.slack_g_per_k, here.at.heat
+    decay = np.maximum(-p.t_before / p.t_end, LEAST_DECAY)
+    low, high = p.t_low - here.t_cl_degc, p.t_high - here.t_cl_degc
+    too_cold = (heat >= AT_SLACK * slack) & (low > 0.0)
+    too_hot = (heat <= -AT_SLACK * slack) & (high < 0.0)
+    given = slack * (too_cold.astype(float) - too_hot)
+    low, high = np.where(too_cold, -inf, low), np.where(too_hot, inf, high)
+    more = here.cross_curvature * (charge - here.at.charge)
+    response = of_heat / p.t_end**2
+    offset = more / p.t_end + response * _sums(given - heat, decay)
+    price = funnel(offset, response, low, high, decay, steps=HEAT_HALF_STEPS * len(decay) // 2)
+    jump = price - np.append(decay[1:] * price[1:], 0.0)
+    found: Floats = np.clip(jump + given, -slack, slack)
+    return found
 
-    def __init__(self, program: Program, here: Dual) -> None:
-        self._p = p = program
-        decay = np.maximum(-p.t_before / p.t_end, LEAST_DECAY)
-        self._phi = phi = np.cumprod(decay)
-        self._per = 1.0 / (p.t_end * phi)
-        x = here.t_cl_degc / phi
-        self._start = p.t_cl_degc
-        self._change = np.diff(x, prepend=p.t_cl_degc)
-        self._price = np.cumsum((phi * here.at.heat)[::-1])[::-1]
-        self._low, self._high = p.t_low / phi, p.t_high / phi
 
-    def heat(self, of_heat: Floats, more: Floats) -> Floats:
-        """Multipliers of the limits, given a stage's response and its further heat.
-
-        A limit whose multiplier would be more than the price of its slack gets that price, and is
-        a limit no more.
-        """
-        slack = self._p.slack_g_per_k
-        response = of_heat * self._per**2
-        offset = self._change + more * self._per - response * self._price
-        low, high = self._low.copy(), self._high.copy()
-        given = np.zeros_like(offset)
-        for _ in range(SOFTENED):
-            base = np.cumsum((self._phi * given)[::-1])[::-1]
-            price = funnel(offset + response * base, response, low, high, self._start)
-            jump = (price - np.append(price[1:], 0.0)) / self._phi
-            over = (np.abs(jump) > slack) & (given == 0.0)
-            if not over.any():
-                break
-            given[over] = np.sign(jump[over]) * slack
-            low[over], high[over] = -np.inf, np.inf
-        found: Floats = np.clip(jump + given, -slack, slack)
-        return found
-
-    def moved(self, heat: Floats) -> Floats:
-        """How nu moves with the multipliers."""
-        p, after, found = self._p, 0.0, []
-        before = [*p.t_before[1:].tolist(), 0.0]
-        ends, steps = p.t_end.tolist(), heat.tolist()
-        for k in range(len(steps) - 1, -1, -1):
-            after = (steps[k] - before[k] * after) / ends[k]
-            found.append(after)
-        return np.array(found[::-1])
+def _sums(heat: Floats, decay: Floats) -> Floats:
+    """Return M of multipliers."""
+    sum_, found = 0.0, []
+    for own, on in zip(heat[::-1].tolist(), decay[::-1].tolist(), strict=True):
+        sum_ += own
+        found.append(sum_)
+        sum_ *= on
+    return np.array(found[::-1])

@@ -85,3 +85,37 @@ def least(
         ratio[best],
         gives[best],
     )
+
+
+def least_convex(
+    curves: Curves,
+    net_w: Floats,
+    low_w: Floats,
+    high_w: Floats,
+    price_fuel: Floats,
+    price_power: Floats,
+    price_internal: Floats,
+) -> Least:
+    """Minimise as `least` does, for a convex f: there is one piece that the least lies on.
+
+    It is the first one whose E_i, within the limits, does not lie beyond its end. Parameters as of
+    `least`.
+    """
+    w_internal = np.maximum(price_internal, LEAST_PRICE)
+    per = 1.0 / w_internal[:, None]
+    ratio = (price_fuel[:, None] * curves.slope + price_power[:, None]) * per
+    ratio = np.maximum(ratio, LEAST_RATIO)
+    ohm = np.where(ratio > 1.0, curves.discharge_ohm, curves.charge_ohm)
+    free = net_w[:, None] - curves.square_v2 / (4.0 * ohm) * (1.0 - 1.0 / ratio**2)
+    kept = np.minimum(np.maximum(free[:, :-1], low_w[:, None]), high_w[:, None])
+    is_beyond = kept > curves.end_w[:-1]
+    best = (np.arange(len(net_w)), is_beyond.cumprod(axis=1).sum(axis=1))
+    own, begin = free[best], curves.begin_w[best[1]]
+    power = np.minimum(np.maximum(np.maximum(own, begin), low_w), high_w)
+    inside = (own > np.maximum(begin, low_w)) & (own < high_w)
+    gives = curves.square_v2 / (2.0 * ohm[best] * ratio[best] ** 3 * w_internal)
+    slope = curves.slope[best[1]]
+    fuel = slope * power + curves.intercept[best[1]]
+    internal = curves.internal_w(net_w - power)
+    cost = price_fuel * fuel + price_power * power + price_internal * internal
+    return Least(power, fuel, internal, cost, slope, ratio[best], np.where(inside, gives, 0.0))

@@ -55,17 +55,17 @@ def thermostat_step(
     straight = start_k + heat_w * duration_s / capacity
     opens = where(start_k < 0.0, where(straight > 0.0, 1.0, 0.0), 0.0)
     closed_s = where(opens > 0.0, -start_k * capacity / where(opens > 0.0, heat_w, 1.0), 0.0)
-    ever = where(start_k < 0.0, opens, 1.0)  # open; C calls no function if it never is
-    open_for = -(duration_s - closed_s) / tau
-    decay = where(ever > 0.0, exp(open_for), 1.0)
-    settled = where(ever > 0.0, -expm1(open_for), 0.0)  # 1 - decay, exact for short stages too
+    ever = where(start_k < 0.0, opens, 1.0)  # open
+    open_for = where(ever > 0.0, -(duration_s - closed_s) / tau, 0.0)
+    decay = exp(open_for)  # also if it never is open, so that C does the same work
+    settled = -expm1(open_for)  # 1 - decay, exact for short stages too
     # the exponential, for as long as it is open; then the line, from u = 0
     apart = start_k - aim
     curved = start_k * decay + aim * settled  # no difference of large numbers for a small slope
     closes = where(start_k >= 0.0, where(curved < 0.0, 1.0, 0.0), 0.0)
     shut = where(closes > 0.0, apart, 1.0)
     share = where(closes > 0.0, start_k / where(closes > 0.0, -aim, 1.0), 0.0)
-    line_s = duration_s - where(closes > 0.0, tau * log1p(share), 0.0)
+    line_s = duration_s - tau * log1p(share)
 
     uncrossed = where(start_k >= 0.0, curved, straight)
     crossed = where(closes > 0.0, heat_w * line_s / capacity, uncrossed)

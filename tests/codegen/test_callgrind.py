@@ -37,10 +37,11 @@ def counted(
     overrides: dict[str, object] | None = None,
     vehicle: Vehicle = VEHICLE,
     precision: Precision = "f64",
+    name: str = "mh-qp",
 ) -> tuple[NDArray[np.int64], Run]:
     """Drive a trip; return the instructions of each call of mpc_step, and the run."""
     settings = ControllerSettings().with_settings(overrides or {})
-    recorder = Recorder(Trip(trip, vehicle), settings, precision)
+    recorder = Recorder(Trip(trip, vehicle), settings, precision, name)
     project = project_files(recorder.controller.library.values, "host", precision)
     with TemporaryDirectory() as scratch:
         folder = Path(scratch)
@@ -99,6 +100,17 @@ def test_instructions_vary_by_less_than_one_percent_over_a_trip(t_cl_init_degc) 
     assert not is_open[-1]
     assert is_open[0] == (t_cl_init_degc == 88.0)
     assert len(counts) == trip.steps
+    assert np.ptp(counts) < 0.01 * np.median(counts)
+
+
+@pytest.mark.parametrize("precision", ["f32", "f64"])
+def test_those_of_costates_vary_by_less_than_one_percent(precision) -> None:
+    """To arrival, so with more and more stages masked; the thermostat open at first."""
+    vehicle = VEHICLE.with_settings({"trip.t_cl_init_degc": 88.0})
+    whole = load_cycle("nycc")
+    trip = Cycle.from_samples("part", np.arange(121.0), whole.speed_mps[180:301])
+    counts, run = counted(trip, vehicle=vehicle, precision=precision, name="mh-costate")
+    assert run.trajectory.engine_on.any()
     assert np.ptp(counts) < 0.01 * np.median(counts)
 
 

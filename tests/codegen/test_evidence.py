@@ -13,7 +13,9 @@ PROGRAMS = [
 ]  # fmt: skip
 
 
-@pytest.fixture(scope="module", params=["f32 admm", "f64 admm", "f32 osqp", "f64 osqp"])
+@pytest.fixture(
+    scope="module", params=["f32 admm", "f64 admm", "f32 osqp", "f64 osqp", "f32 costate"]
+)
 def project(request, tmp_path_factory) -> Path:
     precision, algorithm = request.param.split()
     folder = tmp_path_factory.mktemp(f"{precision}-{algorithm}")
@@ -40,7 +42,9 @@ def test_the_compilers_analyzer_finds_nothing(project, compiler) -> None:
 
 
 # each algorithm and each precision once: a path or a rule hangs on one of them, not on both
-ONCE_EACH = pytest.mark.parametrize("project", ["f32 admm", "f64 osqp"], indirect=True)
+ONCE_EACH = pytest.mark.parametrize(
+    "project", ["f32 admm", "f64 osqp", "f32 costate"], indirect=True
+)
 
 
 @ONCE_EACH
@@ -96,6 +100,7 @@ def deviations() -> set[str]:
 @ONCE_EACH
 def test_misra_findings_are_the_deviations_explained(project) -> None:
     need("cppcheck")
+    costate = sorted(p.name for p in project.glob("mpc_costate*.c"))  # the rest is that of the QP
     checked = run(
         project,
         "cppcheck",
@@ -107,10 +112,11 @@ def test_misra_findings_are_the_deviations_explained(project) -> None:
         "--template={file}:{line} {id}",
         "-Iosqp",
         "-Iosqp/inc/public",
-        *sources(project),
+        *(costate or sources(project)),
     )
     found = [line.split()[-1] for line in checked.stderr.splitlines() if line.startswith("mpc")]
     rules = {name.removeprefix("misra-c2012-") for name in found}
+    rules -= {"2.5"} if costate else set()  # macros that the other files use
     assert rules <= deviations(), checked.stderr
     assert found, "the addon reports nothing at all: has it run?"
 

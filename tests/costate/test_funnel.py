@@ -18,37 +18,45 @@ def problems(draw):
         return np.array(draw(st.lists(st.floats(low, high), min_size=n, max_size=n)))
 
     offset, response = numbers(-1.0, 1.0), numbers(0.05, 2.0)
-    start, target = draw(st.floats(-1.0, 1.0)), draw(st.floats(-1.0, 1.0))
-    path = start + np.cumsum(offset + response * numbers(-2.0, 2.0))
+    decay = numbers(0.3, 1.0)
+    path = sums(decay) @ (offset + response * numbers(-2.0, 2.0))
     room_below, room_above = numbers(0.0, 2.0), numbers(0.0, 2.0)
     is_free = numbers(0.0, 1.0) > 0.6
     low = np.where(is_free, -1e3, path - room_below)
     high = np.where(is_free, 1e3, path + room_above)
-    return offset, response, low, high, start, target
+    return offset, response, low, high, decay
+
+
+def sums(decay):
+    """x of unit terms, shape (n, n)."""
+    n = len(decay)
+    return np.array(
+        [[np.prod(decay[j + 1 : k + 1]) * (j <= k) for j in range(n)] for k in range(n)]
+    )
 
 
 @settings(deadline=None, max_examples=150)
 @given(problems())
 def test_prices_are_those_of_the_qp(problem):
-    offset, response, low, high, start, target = problem
-    n = len(offset)
-    price = funnel(offset, response, low, high, start, target)
-    x = start + np.cumsum(offset + response * price)
+    offset, response, low, high, decay = problem
+    price = funnel(offset, response, low, high, decay, steps=1000)
+    of = sums(decay)
+    x = of @ (offset + response * price)
     assert (x >= low - 1e-9).all()
     assert (x <= high + 1e-9).all()
-    sums = np.tril(np.ones((n, n))) * response
-    bias = start + np.cumsum(offset)
+    bias = of @ offset
+    moves = of * response
     exact = solve_qp(
         np.diag(response),
-        -target * response,
-        np.vstack([sums, -sums]),
+        np.zeros_like(response),
+        np.vstack([moves, -moves]),
         np.concatenate([high - bias, bias - low]),
         solver="daqp",
     )
     assert exact is not None
 
     def cost(p):
-        return 0.5 * (response * (p - target) ** 2).sum()
+        return 0.5 * (response * p**2).sum()
 
     # the solution is unique; its cost is known to the solver's tolerance
     assert cost(price) <= cost(exact) + 1e-6 * (1.0 + cost(exact))
@@ -59,11 +67,11 @@ def test_a_price_falls_over_a_lower_limit_and_rises_over_an_upper_one():
     free = np.full(4, 10.0)
     low, high = -free, free.copy()
     low[1], high[2] = 2.0, 1.0
-    price = funnel(np.zeros(4), np.ones(4), low, high, 0.0)
+    price = funnel(np.zeros(4), np.ones(4), low, high, steps=12)
     assert price == pytest.approx([1.0, 1.0, -1.0, 0.0])
 
 
 def test_a_limit_that_no_price_can_move_is_passed_over():
     low = np.array([1.0, 1.0])
-    price = funnel(np.zeros(2), np.array([0.0, 1.0]), low, low + 1.0, 0.0)
+    price = funnel(np.zeros(2), np.array([0.0, 1.0]), low, low + 1.0, steps=6)
     assert price == pytest.approx([1.0, 1.0])

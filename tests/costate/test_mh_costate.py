@@ -107,7 +107,8 @@ def test_settings_by_name(road):
     settings = {"mh_costate.rounds": 2, "mh_costate.horizon.blocks": 3}
     _, chosen = split_settings(settings, ["mh-costate"])
     made = make_controller("mh-costate", Trip(road, "paper-nimh"), chosen)
-    assert made.planner.preview.count == 20 + 9
+    sizes = made.library.values.sizes
+    assert (sizes.stages, made.library.values.iterations) == (20 + 9, 2)
     with pytest.raises(InputError, match="rounds"):
         split_settings({"mh_costate.rounds": 0}, ["mh-costate"])
     idle = simulate("nycc", "rule-based", settings={"mh_costate.rounds": 2}).remarks

@@ -1,0 +1,121 @@
+"""The numbers of a generated costate controller, beside those that every method needs."""
+
+from qpmpc.codegen.forecast_values import fixed_block_s
+from qpmpc.codegen.shared_values import shared_values
+from qpmpc.codegen.values import CONSTANTS_OF_ALL, Values, of_modules
+from qpmpc.controllers import mh_costate
+from qpmpc.controllers.mh_costate import MhCostateSettings, most_charge_g, unit_g
+from qpmpc.controllers.settings import RuleBasedSettings
+from qpmpc.costate import certificate, dual, funnel, solve, stage
+from qpmpc.costate.curves import Curves
+from qpmpc.costate.path import Shortest
+from qpmpc.costate.solve import moderate
+from qpmpc.errors import InputError
+from qpmpc.pwa.model import PwaModel
+from qpmpc.qp import rows
+from qpmpc.qp.rows import table_of
+from qpmpc.qp.scaling import ScalingSettings
+from qpmpc.qp.settings import QpSettings
+from qpmpc.qp.stage_qp import qp_parameters
+from qpmpc.vehicle.parameters import Vehicle
+
+MOST_STATES = 32  # of the shortest path, a bit each
+
+CONSTANTS = CONSTANTS_OF_ALL | of_modules(
+    (rows, "SHORTEST_SCALE_S COOL_SHARE"),
+    (stage, "LEAST_RATIO LEAST_PRICE"),
+    (funnel, "LEAST_RESPONSE UNLIMITED"),
+    (
+        solve,
+        "CHARGE_HALF_STEPS HEAT_HALF_STEPS LEAST_RISE_G BACKGROUND LEAST_DECAY AT_SLACK FIRST_SHARE"
+        " MOST_SHARE GROWS SHRINKS STREAK",
+    ),
+    (certificate, "ABOVE_MULTIPLIERS"),
+)
+SWITCH = "SWITCH_G_PER_S LONG_SWITCH_G_PER_S"
+START_SWITCH = "START_SWITCH_G_PER_S START_LONG_SWITCH_G_PER_S"
+
+
+def costate_values_of(
+    vehicle: Vehicle,
+    settings: MhCostateSettings,
+    rules: RuleBasedSettings,
+    blocks: int | None = None,
+) -> Values:
+    """Collect the numbers of a controller that plans by costates.
+
+    Parameters
+    ----------
+    vehicle, rules, blocks : as of `values_of`
+    settings : of the controller
+
+    Raises
+    ------
+    InputError
+        If there is no long horizon or its number of blocks is open, or shortest run or rest and
+        short horizon are both longer than generated code can hold.
+    """
+    model, engine = PwaModel.of(vehicle), vehicle.engine
+    shared = shared_values(vehicle, model, settings.horizon, rules, blocks, "mh_costate")
+    curves = Curves.of(vehicle, model.line)
+    envelope, shortest = curves.envelope(), Shortest.of(engine)
+    most_states = settings.horizon.short_stages + 1
+    run, rest = min(shortest.on_s, most_states), min(shortest.off_s, most_states)
+    if max(run, rest) > MOST_STATES:
+        raise InputError(
+            f"generated C of mh-costate: engine.min_on_s={engine.min_on_s} and min_off_s="
+            f"{engine.min_off_s} may be {MOST_STATES} at most with "
+            f"mh_costate.horizon.short_stages={settings.horizon.short_stages}"
+        )
+    table, square_v2 = table_of(engine), curves.square_v2
+    moderate_w, moderate_g_per_s = moderate(curves)
+    limits = QpSettings(**settings.limits.model_dump())
+    scalars = {
+        **qp_parameters(vehicle, model, limits, ScalingSettings()),
+        **shared.scalars,
+        "quarter_discharge_w": square_v2 / (4.0 * curves.discharge_ohm),
+        "quarter_charge_w": square_v2 / (4.0 * curves.charge_ohm),
+        "per_quarter_discharge_w": 4.0 * curves.discharge_ohm / square_v2,
+        "per_quarter_charge_w": 4.0 * curves.charge_ohm / square_v2,
+        "moderate_w": moderate_w,
+        "moderate_g_per_s": moderate_g_per_s,
+        "cold_charge_g": mh_costate.COLD_CHARGE * unit_g(model),
+        "most_charge_g": most_charge_g(model),
+    }
+    scalars["cranking_soc"] = scalars["cranking_j"] / scalars["battery_energy_j"]
+    arrays = {
+        **shared.arrays,
+        **{
+            f"{name}_{part}": getattr(of, part)
+            for name, of in (("shared", envelope), ("line", curves))
+            for part in ("begin_w", "end_w", "slope", "intercept")
+        },
+    }
+    return Values(
+        vehicle=vehicle.name,
+        table=table,
+        sizes=shared.sizes,
+        scalars=scalars,
+        arrays=arrays,
+        iterations=settings.rounds,
+        departure_iterations=mh_costate.DEPARTURE_ROUNDS,
+        duration_exponent=0.0,
+        counts=shared.counts,
+        block_s=fixed_block_s(settings.horizon),
+        learning=False,
+        departure_linearisations=mh_costate.DEPARTURE_LINEARISATIONS,
+        warm_up_steps=1,
+        constants=CONSTANTS | of_modules((dual, _names_of_dual(table.has_start))),
+        costate={
+            "SHARED_PIECES": len(envelope.slope),
+            "SHARED_STRIDE": 1 << max((len(envelope.slope) - 1).bit_length() - 1, 0),
+            "LINE_PIECES": len(curves.slope),
+            "RUN_STATES": run,
+            "REST_STATES": rest,
+        },
+    )
+
+
+def _names_of_dual(has_start: bool) -> str:
+    """Names of the constants of the dual that this car needs."""
+    return f"LEAST_SWITCH_G {f'{START_SWITCH} START_HALF_STEPS' if has_start else SWITCH}"

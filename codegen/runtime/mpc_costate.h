@@ -1,0 +1,97 @@
+/* Memory of a stage of the costate method, and what its files share; see docs/costate.md. */
+#ifndef MPC_COSTATE_H
+#define MPC_COSTATE_H
+
+#include <stdint.h>
+
+#include "mpc_config.h"
+#include "mpc_rows.h"
+
+/* The program of a stage, SOC and coolant temperature from the origin. */
+typedef struct {
+    mpc_stage_program of; /* generated, see qpmpc.costate.program */
+    mpc_real price_t;     /* cost of a kelvin at its end, of its own and of the next one's growth */
+    mpc_real per_end;     /* 1 / t_end */
+    mpc_real decay;       /* of the coolant, at least LEAST_DECAY, and its inverse */
+    mpc_real per_decay;
+    mpc_real least_of_charge; /* responses of a stage that has none of its own now */
+    mpc_real least_of_heat;
+    mpc_real width;  /* cost over which on and off are smoothed, g */
+    mpc_real must;   /* 1 where the engine has to run, else 0 */
+    mpc_real cannot; /* 1 where it must not, else 0 */
+} mpc_costate_program;
+
+/* The smoothed dual at some multipliers. */
+typedef struct {
+    mpc_real charge; /* lambda at the end of the stage, g */
+    mpc_real heat;   /* multiplier of its coolant limits, g/K */
+    mpc_real nu;
+    mpc_real soc;
+    mpc_real t_cl_k;
+    mpc_real of_charge; /* derivatives of the change of SOC to lambda, of that to nu, */
+    mpc_real cross;
+    mpc_real of_heat; /* of the coolant's heat to nu */
+    mpc_real share;   /* sigma */
+    mpc_real power_w; /* while on, with its fuel and internal power */
+    mpc_real fuel_g_per_s;
+    mpc_real internal_w;
+    mpc_real on_g; /* cost of the whole stage on, off, and of a start */
+    mpc_real off_g;
+#if MPC_STARTS
+    mpc_real start_g;
+#endif
+} mpc_costate_dual;
+
+/* A term of a running sum, see mpc_costate_funnel.c. */
+typedef struct {
+    mpc_real offset;
+    mpc_real response;
+    mpc_real low;
+    mpc_real high;
+    mpc_real decay;
+    mpc_real per_decay; /* its inverse */
+    mpc_real price;     /* found */
+    mpc_real ends;      /* 1 where a stretch of one price ends with it, else 0 */
+} mpc_costate_term;
+
+typedef struct {
+    mpc_stage_road road;
+    mpc_costate_program p;
+    mpc_costate_dual dual[2]; /* where the search is, and what it tries */
+    mpc_real x[MPC_VARS];     /* SOC and coolant temperature from the origin */
+    mpc_real y[MPC_ROWS];     /* multipliers of the SOC and the coolant limits */
+    mpc_real goal_charge;     /* aim of a round */
+    mpc_real goal_heat;
+} mpc_stage;
+
+/* The search. */
+typedef struct {
+    mpc_costate_term
+        term[MPC_STAGES + 2]; /* after the last, one that ends the walk, one for waste */
+    mpc_real value[2];        /* of the duals, and the part that no stage has */
+    mpc_real constant_g[2];
+    mpc_real share; /* of the way to the aim that is tried next */
+    int32_t streak; /* rounds in a row that rose */
+    int32_t here;   /* which dual the search is at */
+    mpc_real certificate_g;
+} mpc_search;
+
+/* Least of a stage with its engine on. */
+typedef struct {
+    mpc_real power_w;
+    mpc_real fuel_g_per_s;
+    mpc_real internal_w;
+    mpc_real cost;
+    mpc_real slope_g_per_j;
+    mpc_real ratio;
+    mpc_real gives;
+} mpc_least;
+
+/* Prices of fuel, engine power and internal power of the battery. */
+typedef struct {
+    mpc_real fuel;
+    mpc_real power;
+    mpc_real internal;
+} mpc_prices;
+
+#endif

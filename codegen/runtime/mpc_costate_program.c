@@ -1,0 +1,42 @@
+/* The program of a second: the numbers of each stage. See qpmpc/costate/program.py. */
+#include "mpc_constants.h"
+#include "mpc_costate_parts.h"
+#include "mpc_costate_values.h"
+#include "mpc_model.h"
+#include "mpc_must_run.h"
+#include "mpc_real.h"
+
+#if MPC_STARTS
+#define SECOND START_SWITCH_G_PER_S
+#define LONGER START_LONG_SWITCH_G_PER_S
+#else
+#define SECOND SWITCH_G_PER_S
+#define LONGER LONG_SWITCH_G_PER_S
+#endif
+
+void mpc_costate_program_fill(mpc_state *state)
+{
+    mpc_stage_sums sums = {REAL(0.0)};
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
+        mpc_costate_program *const p = &state->stage[k].p;
+        const mpc_stage_road *const road = &state->stage[k].road;
+        costate_fill(state, k, &sums);
+        p->price_t = p->of.growing;
+        if (k > 0) {
+            state->stage[k - 1].p.price_t += p->of.growing;
+        }
+        p->per_end = REAL(1.0) / p->of.t_end;
+        p->decay = real_max(-p->of.t_before * p->per_end, LEAST_DECAY);
+        p->per_decay = REAL(1.0) / p->decay;
+        const mpc_real per_s = pick((road->duration_s > REAL(1.0)) ? 1 : 0, LONGER, SECOND);
+        p->width = real_max(per_s * road->duration_s, LEAST_SWITCH_G);
+        const mpc_real background = BACKGROUND / p->width;
+        const mpc_real takes = p->of.charge_per_w * mpc_par.moderate_w;
+        const mpc_real warms = (p->of.per_fuel * mpc_par.moderate_g_per_s)
+                               - (p->of.per_power * mpc_par.moderate_w);
+        p->least_of_charge = background * takes * takes;
+        p->least_of_heat = background * warms * warms;
+        p->must = (mpc_real)must_run(road->net_w, road->speed_mps);
+        p->cannot = (REAL(1.0) - p->must) * above(mpc_par.engine_min_w, p->of.room_w);
+    }
+}

@@ -1,0 +1,75 @@
+/* Rounds of Newton on the dual: each aims at the solution of the linearised problem and tries one
+ * point on the way there, or beyond. The same in Python: qpmpc/costate/solve.py.
+ */
+#include "mpc_constants.h"
+#include "mpc_costate_parts.h"
+#include "mpc_model.h"
+#include "mpc_real.h"
+
+#define LARGEST REAL(1.0e12)
+
+/* All memory of this method is in the state: there is nothing to claim. */
+void mpc_method_claim(const mpc_state *state) { (void)state; }
+
+/* The search is sound, or will be started anew. */
+int32_t mpc_method_check(const mpc_state *state)
+{
+    const mpc_search *const search = &state->search;
+    int32_t fine = ((search->here == 0) || (search->here == 1)) ? 1 : 0;
+    fine &= ((search->streak >= 0) && (search->streak <= STREAK)) ? 1 : 0;
+    return fine & within(search->share, REAL(0.0), MOST_SHARE);
+}
+
+void mpc_method_start(mpc_state *state)
+{
+    mpc_search *const search = &state->search;
+    mpc_costate_program_fill(state);
+    search->here = 0;
+    search->streak = 0;
+    search->share = FIRST_SHARE;
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
+        mpc_stage *const stage = &state->stage[k];
+        stage->dual[0].charge = stage->y[MPC_ROW_CHARGE];
+        stage->dual[0].heat = stage->y[MPC_ROW_HEAT];
+    }
+    mpc_costate_dual_at(state, 0);
+}
+
+/* The point to try, with multipliers of the right sign. */
+static void go_towards_aim(mpc_state *state, int32_t tried)
+{
+    const mpc_search *const search = &state->search;
+    const mpc_real slack = mpc_par.slack_g_per_k;
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
+        mpc_stage *const stage = &state->stage[k];
+        const mpc_costate_dual *const here = &stage->dual[search->here];
+        mpc_costate_dual *const there = &stage->dual[tried];
+        const mpc_real charge = here->charge
+                                + (search->share * (stage->goal_charge - here->charge));
+        const mpc_real heat = here->heat + (search->share * (stage->goal_heat - here->heat));
+        there->charge = real_max(charge, REAL(0.0));
+        there->heat = real_clip(heat, -slack, slack);
+    }
+}
+
+int32_t mpc_method_iterate(mpc_state *state, int32_t count)
+{
+    mpc_search *const search = &state->search;
+    for (int32_t n = 0; n < count; n++) {
+        const int32_t tried = 1 - search->here;
+        mpc_costate_aim(state);
+        go_towards_aim(state, tried);
+        mpc_costate_dual_at(state, tried);
+        const mpc_real rise = search->value[tried] - search->value[search->here];
+        const int32_t rises = (rise > LEAST_RISE_G) ? 1 : 0;
+        const int32_t streak = (search->streak < STREAK) ? (search->streak + 1) : STREAK;
+        const int32_t grows = ((streak >= STREAK) || (search->share < REAL(1.0))) ? 1 : 0;
+        const mpc_real grown = real_min(GROWS * search->share, MOST_SHARE);
+        const mpc_real more = pick(grows, grown, search->share);
+        const mpc_real less = SHRINKS * real_min(search->share, REAL(1.0));
+        search->here = (rises != 0) ? tried : search->here;
+        search->streak = (rises != 0) ? streak : 0;
+        search->share = pick(rises, more, less);
+    }
+    return within(search->value[search->here], -LARGEST, LARGEST);
+}
