@@ -76,5 +76,7 @@ def test_published_runs_are_made_again() -> None:
             parameters.cycle, "mh-qp", parameters.vehicle, settings=parameters.settings
         )
         fuel_g = float(published[parameters.run]["fuel_soc_balanced_g"])
-        # other processors round differently, which may flip a decision or two
-        assert run.fuel_soc_balanced_g == pytest.approx(fuel_g, rel=1e-3)
+        # other processors round differently, which may flip a decision or two; the rows of prius-*
+        # are of the version before, as the page says, with the optimal line on a grid of 5 rpm
+        rel = 5e-3 if parameters.vehicle.startswith("prius") else 1e-3
+        assert run.fuel_soc_balanced_g == pytest.approx(fuel_g, rel=rel)
