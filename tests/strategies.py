@@ -8,7 +8,7 @@ NUMBERS = {
     "chassis.eta_regen": st.floats(0.0, 1.0),
     "engine.density_kg_per_l": st.floats(1e-5, 2.0),
     "engine.start_fuel_g": st.floats(0.0, 5.0),
-    "engine.start_energy_j": st.floats(0.0, 13_500.0),
+    "engine.start_energy_j": st.floats(0.0, 4_000.0),
     "engine.min_on_s": st.integers(0, 600),
     "engine.min_off_s": st.integers(0, 600),
     "engine.ramp_w_per_s": st.floats(1.0, 1e6),

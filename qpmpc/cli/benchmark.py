@@ -82,9 +82,9 @@ def benchmark(
         )
     if out is not None:
         from qpmpc.verification.benchmark.export import write_qps
-        from qpmpc.verification.benchmark.problem_set import problem_set
-        from qpmpc.verification.benchmark.recorder import record
         from qpmpc.verification.benchmark.report import write_benchmark
+        from qpmpc.verification.problems.problem_set import problem_set
+        from qpmpc.verification.problems.recorder import record
 
         write_benchmark(result, car, out)
         write_qps([record(trip, settings) for trip in trips], problem_set(car, settings), out)

@@ -26,8 +26,8 @@ INNER_KEYS = {
 
 
 ALGORITHMS = {
-    "mh-qp": "admm f64", "mh-qp-paper": "osqp", "mh-nlp": "ipopt", "mh-costate": "costate newton",
-    "rule-based": None,
+    "mh-qp": "admm f64", "mh-qp-paper": "osqp", "mh-nlp": "ipopt",
+    "mh-costate": "costate newton f64", "rule-based": None,
 }  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from qpmpc.solvers import AdmmSettings, Status, make_solver, solver_names
 from qpmpc.solvers.osqp import Osqp
 from qpmpc.trip import Trip
 from qpmpc.vehicle import load_vehicle
-from qpmpc.verification.benchmark.recorder import Recording, record
+from qpmpc.verification.problems.recorder import Recording, record
 from qpmpc.verification.renderings.kkt import kkt_residuals, objective
 
 TOLERANCE = 1e-8

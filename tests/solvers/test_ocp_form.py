@@ -14,7 +14,7 @@ from qpmpc.solvers.forms import BoundsApart
 from qpmpc.solvers.ocp_form import OcpForm
 from qpmpc.trip import Trip
 from qpmpc.vehicle import load_vehicle
-from qpmpc.verification.benchmark.recorder import Recording, record
+from qpmpc.verification.problems.recorder import Recording, record
 from qpmpc.verification.renderings.kkt import objective
 
 ROUNDING = 1e-12

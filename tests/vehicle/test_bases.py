@@ -110,7 +110,7 @@ def test_an_array_alone_must_fit_those_of_the_base(write):
 @pytest.mark.parametrize(
     ("base", "words"),
     [
-        ('"prius"', ["mine.toml: base: unknown vehicle 'prius'", "prius-nimh, prius-liion"]),
+        ('"prius"', ["mine.toml: base: unknown vehicle 'prius'", "prius-nimh, prius-2016"]),
         ('""', ["mine.toml: base: unknown vehicle ''"]),
         ('"none.toml"', ["mine.toml: base: vehicle file", "none.toml: no such file"]),
         ('"a\\u0000.toml"', ["mine.toml: base: vehicle file", "null"]),

@@ -18,10 +18,10 @@ from qpmpc.verification.benchmark.candidates import Candidate, candidates
 from qpmpc.verification.benchmark.drive import drive
 from qpmpc.verification.benchmark.export import recorded_npz
 from qpmpc.verification.benchmark.on_samples import cold_and_warm, stopped
-from qpmpc.verification.benchmark.recorder import record
 from qpmpc.verification.benchmark.report import write_benchmark
 from qpmpc.verification.benchmark.sampled import samples
 from qpmpc.verification.benchmark.table import benchmark_table, solvers_table
+from qpmpc.verification.problems.recorder import record
 
 VEHICLE = load_vehicle()
 

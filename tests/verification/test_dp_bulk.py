@@ -131,7 +131,7 @@ def test_a_run_that_is_no_optimum_is_not_comparable() -> None:
 
 def test_a_tube_that_does_not_settle_is_remarked() -> None:
     narrow = {"dp.grid": "quick", "dp.tube_soc": 1e-3, "dp.tube_t_cl_k": 0.1}
-    run = simulate("nycc", "dp", VEHICLE, settings=narrow)
+    run = simulate("nedc-truncated", "dp", VEHICLE, settings=narrow)
     assert [line for line in run.remarks if "the edge of its tube after 6 tubes" in line]
     assert not simulate(urban(), "dp", VEHICLE, settings={"dp.grid": "quick"}).remarks
 

@@ -15,7 +15,7 @@ from qpmpc.errors import QpmpcError
 from qpmpc.qp import CvxpyTwin, Var
 from qpmpc.trip import Trip
 from qpmpc.vehicle import Vehicle, load_vehicle
-from qpmpc.verification.benchmark.recorder import record
+from qpmpc.verification.problems.recorder import record
 from qpmpc.verification.renderings.cvxpy_matrices import cvxpy_matrices
 from qpmpc.verification.renderings.equivalence import Renderings, check_equivalence
 from qpmpc.verification.renderings.generated_qp import READ

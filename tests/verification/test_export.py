@@ -18,8 +18,8 @@ from qpmpc.solvers import make_solver
 from qpmpc.trip import Trip
 from qpmpc.vehicle import load_vehicle
 from qpmpc.verification.benchmark.export import write_qps
-from qpmpc.verification.benchmark.problem_set import Problem, problem_set
-from qpmpc.verification.benchmark.recorder import Recording, record
+from qpmpc.verification.problems.problem_set import Problem, problem_set
+from qpmpc.verification.problems.recorder import Recording, record
 from qpmpc.verification.renderings.kkt import objective
 
 VEHICLE = load_vehicle()

@@ -7,8 +7,8 @@ from qpmpc.solvers import QpSolver, Status, make_solver, solver_names
 from qpmpc.solvers.feasibility import is_infeasible
 from qpmpc.solvers.osqp import Osqp
 from qpmpc.vehicle import load_vehicle
-from qpmpc.verification.benchmark.problem_set import Problem, problem_set
 from qpmpc.verification.checks.backend_checks import AGREE, CYCLING, DENSE, LOOSE, TO_THE_END
+from qpmpc.verification.problems.problem_set import Problem, problem_set
 from qpmpc.verification.renderings.kkt import objective
 
 ACTIVE = 1e-6  # solver units

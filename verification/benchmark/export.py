@@ -27,8 +27,8 @@ import numpy as np
 from qpmpc.files import write_bytes, write_text
 from qpmpc.qp.stage_qp import QpData
 from qpmpc.qp.structure import QpStructure
-from qpmpc.verification.benchmark.problem_set import Problem
-from qpmpc.verification.benchmark.recorder import Recording
+from qpmpc.verification.problems.problem_set import Problem
+from qpmpc.verification.problems.recorder import Recording
 
 TEST_SET = "qpmpc_recorded.py"
 

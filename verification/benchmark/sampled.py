@@ -12,7 +12,7 @@ from qpmpc.qp.structure import QpStructure
 from qpmpc.solvers.base import Floats
 from qpmpc.solvers.names import make_solver
 from qpmpc.trip import Trip
-from qpmpc.verification.benchmark.recorder import record
+from qpmpc.verification.problems.recorder import record
 from qpmpc.verification.renderings.kkt import objective
 
 EXACT = 1e-9  # tolerance of the reference, PIQP, which drives

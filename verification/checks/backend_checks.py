@@ -11,10 +11,10 @@ from qpmpc.solvers.base import QpSolution, QpSolver, Status
 from qpmpc.solvers.names import make_solver, solver_names
 from qpmpc.solvers.osqp import Osqp
 from qpmpc.solvers.settings import AdmmSettings
-from qpmpc.verification.benchmark.problem_set import Problem, problem_set
 from qpmpc.verification.checks.check import Check
 from qpmpc.verification.checks.context import Context
 from qpmpc.verification.checks.qp_checks import exact, samples
+from qpmpc.verification.problems.problem_set import Problem, problem_set
 from qpmpc.verification.renderings.kkt import kkt_residuals, objective
 
 QUICK_BACKENDS = (

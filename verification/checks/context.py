@@ -12,7 +12,7 @@ from qpmpc.results import Run
 from qpmpc.solvers.base import Floats
 from qpmpc.trip import Trip
 from qpmpc.vehicle import Vehicle, load_vehicle
-from qpmpc.verification.benchmark.recorder import record
+from qpmpc.verification.problems.recorder import record
 
 QUICK_CYCLES = ("nycc",)
 FULL_CYCLES = ("nycc", "nedc-truncated")

@@ -16,7 +16,7 @@ from qpmpc.qp.stage_qp import QpData
 from qpmpc.qp.structure import QpStructure
 from qpmpc.trip import Trip
 from qpmpc.vehicle.parameters import Vehicle
-from qpmpc.verification.benchmark.recorder import record
+from qpmpc.verification.problems.recorder import record
 
 Floats = NDArray[np.float64]
 Kind = Literal["ordinary", "degenerate", "infeasible"]

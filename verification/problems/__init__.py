@@ -1,0 +1,1 @@
+"""QPs to solve: those that a run records, and a set of hard ones."""
