@@ -105,10 +105,7 @@ def project_files(
     """
     one_of(target, TARGETS, "target")
     one_of(precision, PRECISIONS, "precision")
-    if values.costate is not None:
-        algorithm = "costate"
-    else:
-        one_of(algorithm, ALGORITHMS, "algorithm")
+    algorithm = algorithm_of(values, algorithm)
     checked_prefix(prefix)
     files = _runtime(values, algorithm)
     of_osqp = osqp_files(values, precision) if algorithm == "osqp" else {}
@@ -132,6 +129,17 @@ def project_files(
         files[output] = _environment().get_template(template).render(context)
     files |= example_files(target)
     return with_prefix(dict(sorted((files | of_osqp).items())), prefix)
+
+
+def algorithm_of(values: Values, algorithm: Algorithm) -> Algorithm:
+    """Return the algorithm of a project: that of the QP, or of costates, which have no choice.
+
+    Raises
+    ------
+    InputError
+        If the QP has no such algorithm.
+    """
+    return one_of(algorithm, ALGORITHMS, "algorithm") if values.costate is None else "costate"
 
 
 def _runtime(values: Values, algorithm: Algorithm) -> dict[str, str]:

@@ -257,16 +257,15 @@ def _max(values: Floats) -> float | None:
     return float(values.max()) if len(values) else None
 
 
-def has_price(optimum: Run | None) -> bool:
-    """Whether this run of `dp`, if there is one, tells what final SOC is worth on our plant."""
-    return optimum is not None and optimum.soc_price_g is not None and optimum.plant is None
+def soc_price_of(optimum: Run | None) -> float | None:
+    """What final SOC is worth by this run of `dp`; None without one, and on a foreign plant."""
+    return None if optimum is None or optimum.plant is not None else optimum.soc_price_g
 
 
 def balanced_g(run: Run, optimum: Run | None) -> float:
     """SOC-balanced fuel at the price of this run of `dp`, or without one at `trip.eta_eq`."""
-    if optimum is None or optimum.soc_price_g is None or optimum.plant is not None:
-        return run.fuel_soc_balanced_g
-    return run.fuel_balanced_at_g(optimum.soc_price_g)
+    price_g = soc_price_of(optimum)
+    return run.fuel_soc_balanced_g if price_g is None else run.fuel_balanced_at_g(price_g)
 
 
 def compare_runs(runs: Sequence[Run]) -> list[dict[str, Any]]:
@@ -285,7 +284,8 @@ def compare_runs(runs: Sequence[Run]) -> list[dict[str, Any]]:
 
     rows = []
     for run in runs:
-        fuel_g, priced = balanced[run.cycle, run.controller], has_price(optima.get(run.cycle))
+        fuel_g = balanced[run.cycle, run.controller]
+        priced = soc_price_of(optima.get(run.cycle)) is not None
         share = {
             other: fuel_g / balanced[run.cycle, other]
             for other in (REFERENCE, OPTIMUM)

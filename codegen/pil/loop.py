@@ -18,7 +18,7 @@ from qpmpc.codegen.firmware import (
     build_firmware,
     footprint,
 )
-from qpmpc.codegen.generate import Algorithm, Precision
+from qpmpc.codegen.generate import Algorithm, Precision, algorithm_of
 from qpmpc.codegen.method import Generated, Method
 from qpmpc.controllers.base import Controller, Decision, Progress
 from qpmpc.controllers.settings import ControllerSettings
@@ -199,8 +199,7 @@ def processor_in_the_loop(
     """
     method = Method.of(controller, settings or ControllerSettings())
     values = method.values(trip.vehicle, method.horizon.block_count(trip.forecast.steps))
-    if values.costate is not None:
-        algorithm = "costate"
+    algorithm = algorithm_of(values, algorithm)
     twin = method.twin(trip)
     commands: list[Command] = []
     references: list[Command] = []

@@ -111,6 +111,7 @@ class MhCostate(Planner):
         vehicle = trip.vehicle
         self.preview = trip.preview(own.horizon)
         self.model = PwaModel.of(vehicle)
+        self._most_charge_g = most_charge_g(self.model)
         self.programs = ProgramBuilder(
             vehicle, self.model, self.preview.count, own.limits, own.horizon
         )
@@ -188,7 +189,7 @@ class MhCostate(Planner):
         rounds: int,
     ) -> CostatePlan:
         program = self.programs.at(stages, seen.soc, seen.t_cl_degc, about, seen.engine_on)
-        found = newton(program, start, rounds, most_charge_g(self.model))
+        found = newton(program, start, rounds, self._most_charge_g)
         layout = Layout.of(stages, self._horizon, self._shortest, seen.engine_for_s)
         exact = StageCosts.of(program, found.at, program.curves)
         costs = found.costs.with_first(layout.short, exact)

@@ -48,7 +48,8 @@ class RampFloor:
             shape (n,)
         soc : state of charge now
         """
-        vehicle, battery, engine = self._vehicle, self._vehicle.battery, self._vehicle.engine
+        battery, engine = self._vehicle.battery, self._vehicle.engine
+        at_most_w = self._vehicle.battery_discharge_max_w - POWER_MARGIN_W
         to_spare = max(soc - (battery.soc_min + SOC_KEPT), 0.0)
         seconds_w = net_w.tolist()
         total_w, least_w = sum(seconds_w[:1]), 0.0
@@ -56,7 +57,7 @@ class RampFloor:
             total_w += second_w
             risen_w = (engine.ramp_w_per_s - POWER_MARGIN_W) * k
             gives_w = self._maps.power_to_reach_w(soc, soc - to_spare, k + 1.0)
-            at_once_w = second_w - (vehicle.battery_discharge_max_w - POWER_MARGIN_W) - risen_w
+            at_once_w = second_w - at_most_w - risen_w
             in_all_w = total_w / (k + 1.0) - gives_w - 0.5 * risen_w
             least_w = max(least_w, at_once_w, in_all_w)
         return min(least_w, engine.power_max_w)

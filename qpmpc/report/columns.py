@@ -34,9 +34,13 @@ def _marked(row: Row, key: str, digits: int) -> str:
     return text if row["comparable"] or value is None else text + NOT_COMPARABLE
 
 
+def _is_priced(row: Row) -> bool:
+    """Whether dp found what the final SOC of this run is worth."""
+    return row.get("fuel_soc_balanced_dp_g") is not None
+
+
 def _balanced(row: Row) -> str:
-    at_dp = row.get("fuel_soc_balanced_dp_g") is not None
-    return "fuel_soc_balanced_dp_g" if at_dp else "fuel_soc_balanced_g"
+    return "fuel_soc_balanced_dp_g" if _is_priced(row) else "fuel_soc_balanced_g"
 
 
 def _range(low: float, high: float, digits: int) -> str:
@@ -118,8 +122,8 @@ def notes(rows: Sequence[Row]) -> list[str]:
         )
     if any(not r["comparable"] and r["controller"] in _references(r) for r in rows):
         found.append("  percentages against such a run are no more certain than the run itself")
-    prices = {r["cycle"]: r["soc_price_g"] for r in rows if _balanced(r) != "fuel_soc_balanced_g"
-              and r["soc_price_g"] is not None}  # fmt: skip
+    of_dp = [row for row in rows if row["controller"] == "dp" and _is_priced(row)]
+    prices = {row["cycle"]: row["soc_price_g"] for row in of_dp}
     if prices:
         each = ", ".join(f"{price:.1f} on {cycle}" for cycle, price in prices.items())
         found.append(f"final SOC at the price that dp found, in g per unit of SOC: {each}")

@@ -6,6 +6,7 @@ from matplotlib.figure import Figure
 
 from qpmpc.report.pwa_curves import PwaCurve
 from qpmpc.report.style import BLUE, GREY, LIMIT, VERMILION, png, tidy
+from qpmpc.vehicle.engine import RAD_PER_S
 from qpmpc.vehicle.from_map import MappedVehicle
 from qpmpc.vehicle.operating_line import torque_range
 
@@ -57,7 +58,7 @@ def _points(axes: Axes, mapped: MappedVehicle) -> None:
         speeds, _, most_nm = torque_range(data.speed_rpm, data.torque_nm)
         axes.plot(speeds, most_nm, label="torque limit", **LIMIT)
         with np.errstate(divide="ignore", invalid="ignore"):
-            torque = line.power_w / (line.speed_rpm * (np.pi / 30.0))
+            torque = line.power_w / (line.speed_rpm * RAD_PER_S)
         axes.plot(line.speed_rpm, torque, color=VERMILION, linewidth=1.6, label="optimal line")
         axes.set_xlabel("engine speed rpm")
         axes.set_ylabel("torque Nm")

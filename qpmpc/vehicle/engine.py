@@ -107,8 +107,6 @@ def _breakpoints_rpm(engine: Engine) -> Floats:
     """Speeds of both tables within the range that they share; linear between."""
     tables = (_of_map(engine.friction_speed_rpm), _of_map(engine.torque_speed_rpm))
     low, high = max(table[0] for table in tables), min(table[-1] for table in tables)
-    if low >= high:
-        raise InputError("engine: friction_speed_rpm and torque_speed_rpm share no speeds")
     inner = {speed for table in tables for speed in table if low < speed < high}
     return np.array([low, *sorted(inner), high])
 
@@ -116,9 +114,8 @@ def _breakpoints_rpm(engine: Engine) -> Floats:
 def _most_w(engine: Engine) -> float:
     """Largest power at any speed: of each stretch a quadratic in N."""
     edges = _breakpoints_rpm(engine)
-    return float(
-        _limit_w(engine, np.append(edges, _vertices_rpm(edges, _limit_w(engine, edges)))).max()
-    )
+    vertices = _vertices_rpm(edges, _limit_w(engine, edges))
+    return float(_limit_w(engine, np.append(edges, vertices)).max())
 
 
 def _vertices_rpm(edges_rpm: Floats, edges_w: Floats) -> Floats:

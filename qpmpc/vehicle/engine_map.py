@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from qpmpc.delimited import Column, DelimitedTable, read_delimited
 from qpmpc.errors import InputError
 from qpmpc.problems import names_shown, shown_value
+from qpmpc.vehicle.engine import RAD_PER_S
 
 Floats = NDArray[np.float64]
 
@@ -105,7 +106,7 @@ def read_engine_data(path: Path, lhv_j_per_g: float) -> EngineData:
         remarks.append(f"{table.titles} line(s) above the header not read")
     speed, torque = found.get("speed"), found.get("torque")
     if speed is not None and torque is not None:
-        power = torque * speed * (np.pi / 30.0)
+        power = torque * speed * RAD_PER_S
         drags, standing = torque < 0.0, speed <= 0.0
         if "power" in found:
             remarks.append("power is that of torque and speed: its own column is not read")

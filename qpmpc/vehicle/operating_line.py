@@ -10,11 +10,10 @@ from scipy.optimize import minimize_scalar
 from scipy.spatial import QhullError
 
 from qpmpc.errors import InputError
+from qpmpc.vehicle.engine import RAD_PER_S
 from qpmpc.vehicle.engine_map import EngineData
 
 Floats = NDArray[np.float64]
-
-RAD_PER_S = np.pi / 30.0  # of a revolution per minute
 
 POINTS = 201  # of the line; straight between them
 SPEEDS = 400  # tried at each power, before the best is refined between its neighbours
