@@ -51,6 +51,8 @@ class InputBuilder:
         into.long_speed_mps[:] = long.speed_mps.tolist()
         into.long_internal_off_w[:] = long.internal_off_w.tolist()
         into.long_must_share[:] = long.must_share.tolist()
+        into.long_free_net_w[:] = long.free_net_w.tolist()
+        into.long_free_internal_off_w[:] = long.free_internal_off_w.tolist()
         into.long_rises[:] = long.rises.tolist()
         into.long_fall_j[:] = long.fall_j.tolist()
         into.long_rise_j[:] = long.rise_j.tolist()

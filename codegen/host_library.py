@@ -27,7 +27,7 @@ from qpmpc.codegen.library_cache import Kept, kept_file
 from qpmpc.codegen.values import Values
 from qpmpc.remarks import say_once
 
-ABI_VERSION = 5
+ABI_VERSION = 6
 _ABI_NAMES = (
     "version",
     "sizeof mpc_real",
@@ -70,6 +70,8 @@ def structures(precision: Precision, short: int, long: int, learning: bool) -> t
             ("long_speed_mps", real * long),
             ("long_internal_off_w", real * long),
             ("long_must_share", real * long),
+            ("long_free_net_w", real * long),
+            ("long_free_internal_off_w", real * long),
             ("long_rises", real * long),
             ("long_fall_j", real * long),
             ("long_rise_j", real * long),

@@ -49,7 +49,7 @@ CONSTANTS_OF_ALL = of_modules(
     (coolant_floor, "USABLE"),
     (qp_planner, "FAILURES_FORGIVEN"),
     (base, "LARGEST_PLAUSIBLE"),
-    (demand, "GRAVITY_MPS2"),
+    (demand, "GRAVITY_MPS2 ROAD_LOAD_DEGC"),
 )
 CONSTANTS = CONSTANTS_OF_ALL | of_modules(
     (qp_planner, "FAILURES_FORGIVEN LEAST_SIZE_W"),

@@ -128,6 +128,9 @@ static void attack_preview(source *from)
         in.long_internal_off_w[k] = (k % 2) ? mpc_par.can_internal_min_w
                                             : mpc_par.can_internal_max_w;
         in.long_must_share[k] = (mpc_real)between(from, 0, 1);
+        in.long_free_net_w[k] = wild_w[(first + turn + k) % 3];
+        in.long_free_internal_off_w[k] = (k % 3) ? mpc_par.can_internal_min_w
+                                                 : mpc_par.can_internal_max_w;
         in.long_rises[k] = (mpc_real)between(from, 0, 3000);
         in.long_fall_j[k] = (mpc_real)between(from, 0, 1) * mpc_par.can_energy_j;
         in.long_rise_j[k] = (mpc_real)between(from, 0, 1) * mpc_par.can_energy_j;

@@ -39,8 +39,8 @@ typedef struct {
      * easy driving, braking): seconds, mean of the net power P0 = demand + auxiliaries (each
      * second clipped at the battery's charge limit before the mean is taken), mean speed, mean of
      * the internal battery power l(P0) with the engine off, share of the seconds in which the engine
-     * must run (P0 beyond the battery's limit, or too fast for an engine that is off); and how often the demand rises into
-     * that class or past it, which matters where starts of the engine cost something (0 if it is not
+     * must run (P0 beyond the battery's limit, or too fast for an engine that is off); means of P0 and l(P0) over the other
+     * seconds (where there are none, over all); and how often the demand rises into that class or past it, which matters where starts of the engine cost something (0 if it is not
      * known: they are then counted over the short horizon alone). 0 seconds where nothing is left.
      * mpc_forecast.h makes the preview from demand and speed of the trip. */
     mpc_real long_duration_s[MPC_LONG];
@@ -48,6 +48,8 @@ typedef struct {
     mpc_real long_speed_mps[MPC_LONG];
     mpc_real long_internal_off_w[MPC_LONG];
     mpc_real long_must_share[MPC_LONG];
+    mpc_real long_free_net_w[MPC_LONG];
+    mpc_real long_free_internal_off_w[MPC_LONG];
     mpc_real long_rises[MPC_LONG];
     /* of the last class of each block, the others are not read: energy, J, by which SOC at the end of
      * the block stays off its lower and its upper limit, because it swings inside the block and the
@@ -114,7 +116,7 @@ void mpc_plan(const mpc_state *state, mpc_real *x, mpc_real *duals);
 /* Layout of this build, for callers in other languages to check theirs: version of this
  * interface, sizeof mpc_real, mpc_in, mpc_out, mpc_state, then MPC_SHORT, MPC_LONG, MPC_VARS,
  * MPC_ROWS, MPC_ITERATIONS, offset of mpc_in.short_count, of mpc_out.engine_on. */
-#define MPC_ABI_VERSION 5
+#define MPC_ABI_VERSION 6
 #define MPC_ABI_ENTRIES 12
 int32_t mpc_abi(int32_t entry);
 

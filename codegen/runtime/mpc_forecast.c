@@ -55,16 +55,27 @@ static void count(mpc_forecast *forecast, int32_t second, int32_t times)
         block[i].rises += times;
     }
     to->seconds += times;
-    to->musts += times * must_run(net_w, forecast->trip.speed_mps[second]);
+    const int32_t must = must_run(net_w, forecast->trip.speed_mps[second]);
+    const mpc_real free = (must != 0) ? REAL(0.0) : sign;
+    const mpc_real off_w = mpc_map_planned_internal_w(net_w);
+    to->musts += times * must;
     add_to(&to->net_w, sign * net_w);
     add_to(&to->speed_mps, sign * forecast->trip.speed_mps[second]);
-    add_to(&to->internal_off_w, sign * mpc_map_planned_internal_w(net_w));
+    add_to(&to->internal_off_w, sign * off_w);
+    add_to(&to->free_net_w, free * net_w);
+    add_to(&to->free_internal_off_w, free * off_w);
 }
 
 static void sum_up(mpc_forecast *forecast)
 {
-    static const mpc_class_sums none = {
-        0, 0, 0, {REAL(0.0), REAL(0.0)}, {REAL(0.0), REAL(0.0)}, {REAL(0.0), REAL(0.0)}};
+    static const mpc_class_sums none = {0,
+                                        0,
+                                        0,
+                                        {REAL(0.0), REAL(0.0)},
+                                        {REAL(0.0), REAL(0.0)},
+                                        {REAL(0.0), REAL(0.0)},
+                                        {REAL(0.0), REAL(0.0)},
+                                        {REAL(0.0), REAL(0.0)}};
     for (int32_t k = 0; k < MPC_LONG; k++) {
         forecast->ahead[k] = none;
     }
@@ -221,9 +232,17 @@ static void fill_long(const mpc_forecast *forecast, int32_t is_arriving, mpc_in 
 #if MPC_CLASSES > 1
         in->long_internal_off_w[k] = share * mean_of(&of->internal_off_w, seconds);
         in->long_must_share[k] = share * ((mpc_real)of->musts / seconds);
+        /* where none is free, the means of all */
+        const int32_t some = ((is_masked == 0) && (of->seconds > of->musts)) ? 1 : 0;
+        const mpc_real free_s = (some != 0) ? (mpc_real)(of->seconds - of->musts) : REAL(1.0);
+        in->long_free_net_w[k] = (some != 0) ? mean_of(&of->free_net_w, free_s) : in->long_net_w[k];
+        in->long_free_internal_off_w[k] = (some != 0) ? mean_of(&of->free_internal_off_w, free_s)
+                                                      : in->long_internal_off_w[k];
 #else
         in->long_must_share[k] = (mpc_real)must_run(in->long_net_w[k], in->long_speed_mps[k]);
         in->long_internal_off_w[k] = mpc_map_planned_internal_w(in->long_net_w[k]);
+        in->long_free_net_w[k] = in->long_net_w[k];
+        in->long_free_internal_off_w[k] = in->long_internal_off_w[k];
 #endif
     }
 }

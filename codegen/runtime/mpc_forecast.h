@@ -43,6 +43,8 @@ typedef struct {
     mpc_sum net_w;
     mpc_sum speed_mps;
     mpc_sum internal_off_w;
+    mpc_sum free_net_w; /* of the seconds in which the engine may be off */
+    mpc_sum free_internal_off_w;
 } mpc_class_sums;
 
 /* Energy, J, that the battery falls and rises. */
@@ -93,8 +95,11 @@ int32_t mpc_in_from_preview(mpc_forecast *forecast, int32_t step, int32_t beyond
 
 /* Power demand at the car's battery and engine, from speed, acceleration and grade (rise over run):
  *
- *     F = A + B v + C v^2 + m (k a + g grade / sqrt(1 + grade^2)),  A only while rolling
- *     P = F v / eta_drive when driving, F v eta_regen when braking
+ *     F = f (A + B v + C v^2) + m (k a + g grade / sqrt(1 + grade^2)),  A only while rolling
+ *     P = F v / eta_drive when driving, F v eta_regen b(v) when braking
+ *
+ * with f = 1 + road_load_share_per_k max(24 degC - T_amb, 0), and b the share of the braking that is
+ * regenerative, from 0 at regen_from_mps to 1 at regen_full_mps.
  *
  * The speed is the mean over a second, the acceleration the difference of speeds at its ends. */
 mpc_real mpc_demand_w(mpc_real speed_mps, mpc_real accel_mps2, mpc_real grade);

@@ -9,14 +9,17 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-static int32_t is_stage(mpc_real duration_s, mpc_real net_w, mpc_real speed_mps,
-                        mpc_real internal_off_w, mpc_real must_share, mpc_real rises,
-                        mpc_real fall_j, mpc_real rise_j)
+static int32_t are_powers(mpc_real net_w, mpc_real internal_off_w)
+{
+    return within(net_w, mpc_par.can_net_min_w, mpc_par.can_net_max_w)
+           & within(internal_off_w, mpc_par.can_internal_min_w, mpc_par.can_internal_max_w);
+}
+
+static int32_t is_stage(mpc_real duration_s, mpc_real speed_mps, mpc_real must_share,
+                        mpc_real rises, mpc_real fall_j, mpc_real rise_j)
 {
     return within(duration_s, REAL(0.0), LONGEST_STAGE_S)
-           & within(net_w, mpc_par.can_net_min_w, mpc_par.can_net_max_w)
            & within(speed_mps, REAL(0.0), mpc_par.can_speed_max_mps)
-           & within(internal_off_w, mpc_par.can_internal_min_w, mpc_par.can_internal_max_w)
            & within(must_share, REAL(0.0), REAL(1.0)) & within(rises, REAL(0.0), LONGEST_STAGE_S)
            & within(fall_j, REAL(0.0), mpc_par.can_energy_j)
            & within(rise_j, REAL(0.0), mpc_par.can_energy_j);
@@ -29,9 +32,10 @@ static int32_t is_possible(const mpc_in *in)
         fine &= mpc_check_second(in->short_demand_w[k], in->short_speed_mps[k]);
     }
     for (int32_t k = 0; k < MPC_LONG; k++) {
-        fine &= is_stage(in->long_duration_s[k], in->long_net_w[k], in->long_speed_mps[k],
-                         in->long_internal_off_w[k], in->long_must_share[k], in->long_rises[k],
-                         in->long_fall_j[k], in->long_rise_j[k]);
+        fine &= is_stage(in->long_duration_s[k], in->long_speed_mps[k], in->long_must_share[k],
+                         in->long_rises[k], in->long_fall_j[k], in->long_rise_j[k]);
+        fine &= are_powers(in->long_net_w[k], in->long_internal_off_w[k]);
+        fine &= are_powers(in->long_free_net_w[k], in->long_free_internal_off_w[k]);
     }
     return fine;
 }
@@ -42,9 +46,10 @@ int32_t mpc_preview_check_kept(const mpc_state *state)
     int32_t fine = 1;
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         const mpc_stage_road *const road = &state->stage[k].road;
-        fine &= is_stage(road->duration_s, road->net_w, road->speed_mps, road->internal_off_w,
-                         road->must_share, REAL_ABS(road->rises), real_max(road->fall_j, REAL(0.0)),
-                         real_max(road->rise_j, REAL(0.0)));
+        fine &= is_stage(road->duration_s, road->speed_mps, road->must_share, REAL_ABS(road->rises),
+                         real_max(road->fall_j, REAL(0.0)), real_max(road->rise_j, REAL(0.0)));
+        fine &= are_powers(road->net_w, road->internal_off_w);
+        fine &= are_powers(road->free_net_w, road->free_internal_off_w);
     }
     return fine;
 }

@@ -60,13 +60,14 @@ mpc_real mpc_qp_relaxation_gap(const mpc_state *state)
     for (int32_t i = 1; i < MPC_FUEL_PIECES; i++) {
         least_fuel = real_max(least_fuel, (FUEL_SLOPE(i) * p_eng_w) + (FUEL_INTERCEPT(i) * on));
     }
-    const mpc_real bat_w = (on * stage->road.net_w) - p_eng_w;
+    const mpc_stage_road *const road = &stage->road;
+    const mpc_real bat_w = ((on * road->free_net_w) + (road->net_w - road->free_net_w)) - p_eng_w;
     mpc_real least_w = (mpc_par.battery_slope[0] * bat_w) + (mpc_par.battery_intercept[0] * on);
     for (int32_t j = 1; j < MPC_BATTERY_PIECES; j++) {
         least_w = real_max(least_w, (mpc_par.battery_slope[j] * bat_w)
                                         + (mpc_par.battery_intercept[j] * on));
     }
-    least_w += (REAL(1.0) - on) * stage->road.internal_off_w;
+    least_w += (REAL(1.0) - on) * road->free_internal_off_w;
     const mpc_real slack_w = (REAL_ABS(fuel - least_fuel) * mpc_par.lhv_j_per_g)
                              + REAL_ABS(internal_w - least_w);
     const mpc_real size_w = (REAL_ABS(fuel) * mpc_par.lhv_j_per_g) + REAL_ABS(internal_w);

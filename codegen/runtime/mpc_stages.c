@@ -19,6 +19,8 @@ void mpc_stages_take(mpc_state *state, const mpc_in *in)
         stage->road.speed_mps = seen * in->short_speed_mps[k];
         stage->road.internal_off_w = mpc_map_planned_internal_w(stage->road.net_w);
         stage->road.must_share = (mpc_real)must_run(stage->road.net_w, stage->road.speed_mps);
+        stage->road.free_net_w = stage->road.net_w;
+        stage->road.free_internal_off_w = stage->road.internal_off_w;
         stage->road.rises = seen;
         stage->road.fall_j = REAL(0.0);
         stage->road.rise_j = REAL(0.0);
@@ -30,6 +32,8 @@ void mpc_stages_take(mpc_state *state, const mpc_in *in)
         stage->road.speed_mps = in->long_speed_mps[k];
         stage->road.internal_off_w = in->long_internal_off_w[k];
         stage->road.must_share = in->long_must_share[k];
+        stage->road.free_net_w = in->long_free_net_w[k];
+        stage->road.free_internal_off_w = in->long_free_internal_off_w[k];
         /* what rises into a class, falls from it to the next stage, the class below */
         stage->road.rises = ((k % MPC_CLASSES) > 0) ? (-mpc_par.rise_share * in->long_rises[k - 1])
                                                     : REAL(0.0);
@@ -54,6 +58,8 @@ void mpc_stages_move_up(mpc_state *state, int32_t by)
         road->speed_mps = seen * later->speed_mps;
         road->internal_off_w = seen * later->internal_off_w;
         road->must_share = seen * later->must_share;
+        road->free_net_w = seen * later->free_net_w;
+        road->free_internal_off_w = seen * later->free_internal_off_w;
         road->rises = seen * later->rises;
         road->fall_j = REAL(0.0);
         road->rise_j = REAL(0.0);

@@ -74,6 +74,8 @@ def _wild(now: Preview, second: int) -> Preview:
             rng.uniform(0.0, WILD_MPS, long),
             rng.uniform(-WILD_W, WILD_W, long),
             rng.uniform(0.0, WILD_SHARE, long),
+            rng.uniform(-WILD_W, WILD_W, long),
+            rng.uniform(-WILD_W, WILD_W, long),
             rng.uniform(0.0, WILD_S, long),
             rng.uniform(0.0, WILD_J, long),
             rng.uniform(0.0, WILD_J, long),

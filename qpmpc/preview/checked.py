@@ -112,6 +112,8 @@ class CheckedPreview:
             and _within(long.speed_mps, 0.0, can.speed_max_mps)
             and _within(long.internal_off_w, can.internal_min_w, can.internal_max_w)
             and _within(long.must_share, 0.0, 1.0)
+            and _within(long.free_net_w, can.net_min_w, can.net_max_w)
+            and _within(long.free_internal_off_w, can.internal_min_w, can.internal_max_w)
             and _within(long.rises, 0.0, LONGEST_STAGE_S)
             and _within(long.fall_j, 0.0, can.energy_j)
             and _within(long.rise_j, 0.0, can.energy_j)

@@ -13,7 +13,9 @@ from qpmpc.preview.swing import NO_LIMIT_J, swings
 from qpmpc.vehicle.must_run import must_run, too_fast
 from qpmpc.vehicle.parameters import Vehicle
 
-FIELDS = 5  # of `Stages` that are means or sums of seconds
+LEAST_SHARE = 1e-6  # of a second in a day: below it is rounding
+FIELDS = 7  # of `Stages` that are means or sums of seconds
+OF_FREE = slice(5, 7)  # those of the seconds that leave a choice alone
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,8 @@ class Stages:
     internal_off_w : mean of the internal battery power l(P0) with the engine off; by convexity
         more than l of the mean, which an averaged preview (one class) has to use
     must_share : share of its seconds in which the engine must run (`qpmpc.vehicle.must_run`)
+    free_net_w, free_internal_off_w : means of P0 and l(P0) over the other seconds, in which the
+        engine may be off; of a stage without such seconds those of all
     rises : r_k, starts of the engine in the stage per on-share that it has more than the stage
         before: u_k >= r_k (sigma_k - sigma_k-1)
     fall_j, rise_j : energy that SOC keeps from its lower and its upper limit at the stage's end,
@@ -42,6 +46,8 @@ class Stages:
     speed_mps: NDArray[np.float64]
     internal_off_w: NDArray[np.float64]
     must_share: NDArray[np.float64]
+    free_net_w: NDArray[np.float64]
+    free_internal_off_w: NDArray[np.float64]
     rises: NDArray[np.float64]
     fall_j: NDArray[np.float64]
     rise_j: NDArray[np.float64]
@@ -147,6 +153,7 @@ class StageBuilder:
         fields = np.zeros((FIELDS, self.count))
         trace = Trace(preview.short_demand_w[:seen], preview.short_speed_mps[:seen])
         fields[:, :seen] = _fields(trace, self._vehicle)
+        _mean_of_free(fields[:, :seen])
         long = preview.long
         fields[:, n:] = (
             long.duration_s,
@@ -154,6 +161,8 @@ class StageBuilder:
             long.speed_mps,
             long.internal_off_w,
             long.must_share,
+            long.free_net_w,
+            long.free_internal_off_w,
         )
         rises = np.zeros(self.count)
         rises[:seen] = 1.0
@@ -184,6 +193,9 @@ class StageBuilder:
         if self.settings.classes == 1:  # an averaged preview has only the mean demand
             fields[3] = internal_off_w(self._vehicle, fields[1])
             fields[4] = must_run(self._vehicle, fields[1], fields[2])
+            fields[OF_FREE] = fields[[1, 3]]
+        else:
+            _mean_of_free(fields)
         return fields
 
     def shift(self) -> NDArray[np.intp]:
@@ -198,17 +210,21 @@ class StageBuilder:
 
 
 def _fields(trace: Trace, vehicle: Vehicle) -> NDArray[np.float64]:
-    """Duration, P0, speed, l(P0) and must of each second, in the order of `Stages`."""
+    """Fields of each second, in the order of `Stages`; `OF_FREE` is 0 where there is no choice."""
     net_w = trace.battery_side_w(vehicle)
+    off_w = trace.internal_off_w(vehicle)
+    must = must_run(vehicle, net_w, trace.speed_mps)
+    free = ~must
     return np.stack(
-        [
-            np.ones(trace.steps),
-            net_w,
-            trace.speed_mps,
-            trace.internal_off_w(vehicle),
-            must_run(vehicle, net_w, trace.speed_mps),
-        ]
+        [np.ones(trace.steps), net_w, trace.speed_mps, off_w, must, free * net_w, free * off_w]
     )
+
+
+def _mean_of_free(fields: NDArray[np.float64]) -> None:
+    """From means over all seconds to those over the seconds that leave a choice, where any do."""
+    share = 1.0 - fields[4]
+    some = share > LEAST_SHARE
+    fields[OF_FREE] = np.where(some, fields[OF_FREE] / np.where(some, share, 1.0), fields[[1, 3]])
 
 
 def _demand_class(demand_w: NDArray[np.float64], settings: HorizonSettings) -> NDArray[np.intp]:

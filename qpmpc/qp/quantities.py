@@ -29,6 +29,8 @@ STAGE = (
     "speed_mps",
     "internal_off_w",
     "must_share",
+    "free_net_w",
+    "free_internal_off_w",
     "rises",
     "fall_j",
     "rise_j",

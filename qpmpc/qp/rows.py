@@ -205,7 +205,8 @@ ROWS = (
     Row(
         "battery",
         "internal + battery_slope * p_eng"
-        " - (net_w * battery_slope + battery_intercept - internal_off_w) * on >= internal_off_w",
+        " - (free_net_w * battery_slope + battery_intercept - free_internal_off_w) * on"
+        " >= free_internal_off_w + (net_w - free_net_w) * battery_slope",
         "battery",
     ),
     Row("p_eng_max", "p_eng - most_w * on <= 0.0"),

@@ -233,7 +233,7 @@ def test_a_trip_driven_with_either_statistics_is_one_trip(library, wrong) -> Non
 
 # Parts of the force, inertia and slope, may cancel: round-off counts in the largest part.
 @pytest.mark.parametrize(("precision", "digits"), [("f64", 1e-15), ("f32", 1e-6)])
-@pytest.mark.parametrize("vehicle", ["prius-nimh", "prius-liion"])
+@pytest.mark.parametrize("vehicle", ["prius-nimh", "prius-2016"])  # cold road load, friction brakes
 def test_demand_of_speed_acceleration_and_grade_equals_python(vehicle, precision, digits) -> None:
     car, flat = load_vehicle(vehicle), load_cycle("wltc-3b")
     grade = np.random.default_rng(1).uniform(-0.1, 0.1, len(flat.time_s))

@@ -25,9 +25,9 @@ POINTS = 20_001
 
 def limits_w(car, net_w):
     """Least and most engine power, engine on, with what the battery can add and take."""
-    engine, battery = car.engine, car.battery
-    low = max(engine.power_min_w, net_w - battery.power_discharge_max_w)
-    return low, max(min(engine.power_max_w, net_w + battery.power_charge_max_w), low)
+    engine = car.engine
+    low = max(engine.power_min_w, net_w - car.battery_discharge_max_w)
+    return low, max(min(engine.power_max_w, net_w + car.battery_charge_max_w), low)
 
 
 def cost_of(name, prices, net_w, power_w):

@@ -52,6 +52,8 @@ def two_stages(h, net_w, speed_mps, t_degc, fuel, power):
         speed_mps * pair,
         float(off_w) * pair,
         must_run(CAR, net_w, speed_mps) * pair,
+        net_w * pair,
+        float(off_w) * pair,
         pair,
         0.0 * pair,
         0.0 * pair,
@@ -116,12 +118,12 @@ def test_other_rows_hold_exactly_where_the_model_allows(h, net_w, data):
     assert over[rows.first("soc")] == pytest.approx(0.0, abs=1e-12)
     assert over[rows["fuel"]].min() == pytest.approx(0.0, abs=1e-9)
     assert over[rows["battery"]].min() == pytest.approx(0.0, abs=1e-6)
-    most = min(CAR.engine.power_max_w, net_w + CAR.battery.power_charge_max_w)
+    most = min(CAR.engine.power_max_w, net_w + CAR.battery_charge_max_w)
     room = (
         upper[1, rows.first("p_eng_max")] - np.einsum("rkv,kv->r", a[1], x)[rows.first("p_eng_max")]
     )
     assert room == pytest.approx(most * on - power, abs=1e-6)
-    missing = max(net_w - CAR.battery.power_discharge_max_w - CAR.engine.power_min_w, 0.0)
+    missing = max(net_w - CAR.battery_discharge_max_w - CAR.engine.power_min_w, 0.0)
     above = power - CAR.engine.power_min_w * on - missing
     assert over[rows.first("p_eng_min")] == pytest.approx(above, abs=1e-6)
 

@@ -102,11 +102,17 @@ def _lowest(qp, data):
 def test_one_stage_optimum_is_the_model_itself():
     # One second, engine forced on by a demand the battery cannot meet: F, G and the states are
     # then the PWA curves and the plant's balances, by hand.
-    net = VEHICLE.battery.power_discharge_max_w + 10e3
+    net = VEHICLE.battery_discharge_max_w + 10e3
     trace = Trace(np.array([net - VEHICLE.battery.aux_power_w]), np.array([20.0]))
     off = trace.internal_off_w(VEHICLE)
     stages = Stages(
-        *(np.array([each]) for each in (1.0, net, 20.0)), off, *np.ones((2, 1)), *np.zeros((2, 1))
+        *np.array([[1.0], [net], [20.0]]),
+        off,
+        np.ones(1),
+        np.array([net]),
+        off,
+        np.ones(1),
+        *np.zeros((2, 1)),
     )
     qp = StageQp(VEHICLE, MODEL, 1, QpSettings(terminal_low=0.7), ScalingSettings())
     x, _ = _lowest(qp, qp.update(stages, 0.6, 60.0, _about(1, 60.0, 0.0)))
@@ -125,7 +131,9 @@ def test_constant_demand_without_thermal_coupling_is_charge_sustaining():
     net = 12e3
     n = 6
     off = Trace(np.full(n, net - VEHICLE.battery.aux_power_w), np.zeros(n)).internal_off_w(VEHICLE)
-    stages = Stages(np.full(n, 10.0), np.full(n, net), np.full(n, 20.0), off, *np.zeros((4, n)))
+    p0 = np.full(n, net)
+    none = np.zeros(n)
+    stages = Stages(np.full(n, 10.0), p0, np.full(n, 20.0), off, none, p0, off, none, none, none)
     vehicle = VEHICLE.with_settings({"cold_engine.k": 0.0, "trip.t_cl_init_degc": 70.0})
     model = PwaModel.of(vehicle)
     qp = StageQp(vehicle, model, n, QpSettings(), ScalingSettings())

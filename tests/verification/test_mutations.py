@@ -195,7 +195,7 @@ MUTATIONS = [
     ),
     Mutation(
         "off-part of the perspective is dropped", BATTERY, "text",
-        ">= internal_off_w", ">= 0.0",
+        ">= free_internal_off_w", ">= 0.0",
         (*QP, *NLP, constant_demand),
         ("Optimum of the QP", "First command, on or off", "Predicted T_cl", "Constant demand"),
     ),

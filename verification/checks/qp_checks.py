@@ -49,13 +49,15 @@ def stages_agree(context: Context) -> Iterator[Check]:
                 (ours.speed_mps, theirs.speed_mps),
                 (ours.internal_off_w, theirs.off_w),
                 (ours.must_share, theirs.must),
+                (ours.free_net_w, theirs.free_net_w),
+                (ours.free_internal_off_w, theirs.free_off_w),
                 (ours.rises, theirs.rises),
             )
             for a, b in pairs:
                 worst = max(worst, float(np.max(np.abs(a - b)) / max(np.abs(b).max(), 1.0)))
         yield Check(
             f"Stages of the horizon, {loop.name}",
-            "Durations, P0, speeds, l(P0), must and rises are those of their seconds.",
+            "Times, P0, speeds, l(P0), seconds with a choice and rises are those of their seconds.",
             1e-9,
             worst,
             "relative",

@@ -27,8 +27,9 @@ SOC, T_CL, P_ENG, ON, FUEL, INTERNAL, T_SLACK, START = range(8)
 class Horizon:
     """Duration (s), P0 (W), mean speed (m/s) and mean l(P0) (W) of each stage; shape (n,).
 
-    `must`: share of the seconds with the engine on in any case. `rises`: starts in the stage for
-    an on-share that is one more than that of the stage before.
+    `must`: share of the seconds with the engine on in any case; `free_net_w`, `free_off_w`: means
+    over the others, over all if there are none. `rises`: starts in the stage for an on-share that
+    is one more than that of the stage before.
     `low_j`, `high_j`: energy to keep from the SOC limits, -inf where there is none.
     """
 
@@ -37,6 +38,8 @@ class Horizon:
     speed_mps: Floats
     off_w: Floats
     must: Floats
+    free_net_w: Floats
+    free_off_w: Floats
     rises: Floats
     low_j: Floats
     high_j: Floats
@@ -59,8 +62,10 @@ def horizon(cycle: Cycle, vehicle: Vehicle, settings: MhQpSettings, step: int) -
     n, length = grid.short_stages, -(-steps // grid.blocks)
     rows: list[list[float]] = []
     for t in range(step, step + n):
-        second = [1.0, net[t], speed[t], off[t], must[t], 1.0, 0.0, 0.0] if t < steps else [0.0] * 8
-        rows.append(second)
+        if t >= steps:
+            rows.append([0.0] * 10)
+            continue
+        rows.append([1.0, net[t], speed[t], off[t], must[t], net[t], off[t], 1.0, 0.0, 0.0])
     for block in range(grid.blocks):
         seconds = range(max(block * length, step + n), min((block + 1) * length, steps))
         classes: list[list[int]] = [[], [], []]
@@ -70,14 +75,17 @@ def horizon(cycle: Cycle, vehicle: Vehicle, settings: MhQpSettings, step: int) -
         into_hard = [t for t in seconds if demand[t - 1] <= grid.class_hard_w < demand[t]]
         off_braking = [t for t in seconds if demand[t - 1] < grid.class_braking_w <= demand[t]]
         for member, entries in zip(classes, ([], into_hard, off_braking), strict=True):
-            of = (net, speed, off, must)
-            means = [float(np.mean(a[member])) for a in of] if member else [0.0] * 4
+            means = [0.0] * 6
+            if member:
+                free = [t for t in member if not must[t]] or member
+                means = [float(np.mean(a[member])) for a in (net, speed, off, must)]
+                means += [float(np.mean(a[free])) for a in (net, off)]
             swing = [-np.inf, -np.inf]  # inside a block SOC is not limited
             rows.append([float(len(member)), *means, -grid.rise_share * len(entries), *swing])
         if (block + 1) * length > step + n < steps and block * length < steps:
-            rows[-1][6:] = _kept_j(block * length, length, off, demand, vehicle, settings)
+            rows[-1][8:] = _kept_j(block * length, length, off, demand, vehicle, settings)
         else:
-            rows[-1][6:] = [0.0, 0.0]
+            rows[-1][8:] = [0.0, 0.0]
     return Horizon(*np.array(rows).T)
 
 
@@ -310,7 +318,8 @@ def stage_program(
     crank_j = drawn_w[1] - drawn_w[0]  # within a second
     per_w = (on_curve[1] - on_curve[0]) / engine.power_max_w
     for k in range(n):
-        h, net, off = float(road.h[k]), float(road.net_w[k]), float(road.off_w[k])
+        h, net = float(road.h[k]), float(road.net_w[k])
+        free, free_off = float(road.free_net_w[k]), float(road.free_off_w[k])
         t0, f0, e0, begin, end = (float(part[k]) for part in about)
         at = {name: k * count + name for name in range(count)}
         before = {name: at[name] - count for name in (SOC, T_CL, ON)}
@@ -366,9 +375,10 @@ def stage_program(
         wasted = 0.0 if floor.max() > coldest else 5.0
         rows.add("fuel most", wasted, {at[FUEL]: 1.0, at[P_ENG]: -per_w, at[ON]: -on_curve[0]})
         for c, d in zip(curves.battery.slope, curves.battery.intercept, strict=True):
-            # sigma l((sigma P0 - E)/sigma) + (1 - sigma) l(P0) <= G
-            terms = {at[INTERNAL]: -1.0, at[P_ENG]: -c, at[ON]: c * net + d - off}
-            rows.add("battery piece", -off, terms)
+            # sigma l((on - E)/sigma) + (1 - sigma) l(free P0) <= G, where the engine takes the
+            # seconds without a choice, and of the others its share: on = P0 - (1 - sigma) free P0
+            terms = {at[INTERNAL]: -1.0, at[P_ENG]: -c, at[ON]: c * free + d - free_off}
+            rows.add("battery piece", -free_off - c * (net - free), terms)
         taken = net + equations.charge_max_w
         if road.must[k] > 0.0:  # the engine turns, at its least power where the battery takes less
             taken = max(taken, engine.power_min_w)

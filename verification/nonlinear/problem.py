@@ -47,6 +47,7 @@ WASTE_G = 0.01  # price of 0.01 of SOC thrown away, far below its worth: keeps S
 REGULARISATION, MASKED_REGULARISATION = 1e-6, 1e-3
 THERMOSTAT_STEPS = 8  # of a long stage; measured: 0.2 K in the mean at 200 s, 0.03 K at 90 s
 NO_DIVISION_BY_ZERO = 1e-9
+ROAD = 8  # h, P0, v, P0 and l of the seconds with a choice, least and most engine power, rises
 POWER_GAP_W = 10.0  # least distance of the limits of engine power
 
 
@@ -69,7 +70,9 @@ class NlpProblem:
 
     - SOC_k <= SOC_{k-1} - h_k/C_bat [sigma_k I(SOC, P0_k - P_k) + (1 - sigma_k) I_off,k(SOC)]
       (paper eq. 1; smaller where the friction brakes take what a full battery cannot), with
-      U I_off = l_k + G(SOC, P0_k) - G(SOC_init, P0_k) and l_k the stage's mean off-power
+      P0_k the mean of the seconds with the engine on, free_k + (mean_k - free_k) / sigma_k, and
+      U I_off = l_k + G(SOC, free_k) - G(SOC_init, free_k); l_k, free_k: means of l(P0) and P0 over
+      the seconds in which the engine may be off
     - C dT/dt = (1 - x)(LHV alpha(T) F_k - E_k) - UA(v_k)(T - T_amb) - Q_heat(T) - Q_rad (eq. 3)
       with F = sigma f(P), E = sigma P; Q_rad follows T within the stage
     - u_k >= r_k (sigma_k - sigma_{k-1}), u_k >= 0: starts, whose fuel, heat and cranking count
@@ -106,7 +109,7 @@ class NlpProblem:
         ca, n, trip = casadi(), self.stages, self.vehicle.trip
         z = ca.MX.sym("z", self.count, n)
         missing = ca.MX.sym("missing")  # of SOC, in solver units
-        road = ca.MX.sym("road", 7, n)  # h, P0, v, l, least and most engine power, rises
+        road = ca.MX.sym("road", ROAD, n)
         state = ca.MX.sym("state", 3)  # SOC, T, whether the engine runs
         x = z * ca.repmat(ca.DM(UNIT[: self.count]), 1, n)
         before = ca.horzcat(state[:2], x[: NlpVar.T_CL + 1, :-1])
@@ -126,7 +129,7 @@ class NlpProblem:
         if self._has_start:
             cost += self.vehicle.engine.start_fuel_g * ca.sum2(x[NlpVar.START, :])
             rise = sigma - ca.horzcat(state[2], sigma[:-1])
-            rows_of_start = [x[NlpVar.START, :] - road[6, :] * rise]
+            rows_of_start = [x[NlpVar.START, :] - road[7, :] * rise]
         if self.settings.soc_penalty_g:
             cost += self.settings.soc_penalty_g * (x[NlpVar.SOC, -1] - trip.soc_target) ** 2
         rows = ca.vertcat(
@@ -135,7 +138,7 @@ class NlpProblem:
             z[NlpVar.SOC, :] + missing,
             x[NlpVar.T_CL, :] + x[NlpVar.T_SLACK, :],
             x[NlpVar.T_CL, :] - x[NlpVar.T_SLACK, :],
-            ((road[5, :] - road[4, :]) * sigma - x[NlpVar.ABOVE, :]) / UNIT[NlpVar.ABOVE],
+            ((road[6, :] - road[5, :]) * sigma - x[NlpVar.ABOVE, :]) / UNIT[NlpVar.ABOVE],
             *rows_of_start,
         )
         self.rows_per_stage = rows.shape[0]
@@ -155,16 +158,22 @@ class NlpProblem:
         """One stage: (SOC and T before, variables, road) -> fuel g, SOC surplus, coolant gap."""
         ca, maps, vehicle = casadi(), self._maps, self.vehicle
         th = vehicle.thermal
-        before, x, road = ca.SX.sym("before", 2), ca.SX.sym("x", self.count), ca.SX.sym("road", 7)
+        before, x, road = (
+            ca.SX.sym("before", 2),
+            ca.SX.sym("x", self.count),
+            ca.SX.sym("road", ROAD),
+        )
         h, net_w, speed_mps = road[0], road[1], road[2]
         sigma = x[NlpVar.ON]
-        power = road[4] + x[NlpVar.ABOVE] / sigma
+        power = road[5] + x[NlpVar.ABOVE] / sigma
         soc = 0.5 * (before[0] + x[NlpVar.SOC])
         t_cl = 0.5 * (before[1] + x[NlpVar.T_CL])
-        most_w = ca.fmin(net_w, vehicle.battery_discharge_max_w)
-        off_w = road[3] + maps.internal_w(soc, most_w)
+        free_w = road[3]
+        on_w = free_w + (net_w - free_w) / sigma  # mean of the seconds with the engine on
+        most_w = ca.fmin(free_w, vehicle.battery_discharge_max_w)
+        off_w = road[4] + maps.internal_w(soc, most_w)
         off_w -= maps.internal_w(vehicle.trip.soc_mean, most_w)
-        drawn_w = sigma * maps.internal_w(soc, net_w - power) + (1.0 - sigma) * off_w
+        drawn_w = sigma * maps.internal_w(soc, on_w - power) + (1.0 - sigma) * off_w
         current = drawn_w / maps.voltage_v(soc)
         fuel = maps.alpha(t_cl) * sigma * maps.fuel_g_per_s(power)  # g/s, of the cold engine
         lhv_j_per_g = vehicle.engine.lhv_j_per_g
@@ -247,7 +256,8 @@ class NlpProblem:
         lower[:, NlpVar.ON] = np.maximum(SIGMA_FORCED * must, SIGMA_LEAST)
         upper[:, NlpVar.ON] = np.where(can, 1.0, 2.0 * SIGMA_LEAST)
         upper[:, NlpVar.T_SLACK :] = np.inf
-        fields = stages.duration_s, net, stages.speed_mps, stages.internal_off_w
+        free = stages.free_net_w, stages.free_internal_off_w
+        fields = stages.duration_s, net, stages.speed_mps, *free
         road = np.stack([*fields, least, most, stages.rises])
         row_lower = self._row_lower.copy()
         row_lower[:, SOC_ROW] = soc_low / UNIT[NlpVar.SOC]
