@@ -48,7 +48,8 @@ def growth(
         at = np.arange(count) % trace.steps
         each = np.ones(count)
         must = must_run(vehicle, net[at], speed[at]).astype(float)
-        stages = Stages(each, net[at], speed[at], off[at], must, each, 0.0 * each, 0.0 * each)
+        p0, none = net[at], 0.0 * each
+        stages = Stages(each, p0, speed[at], off[at], must, p0, off[at], each, none, none)
         about = Linearisation.constant(count, 60.0)
         qp = StageQp(vehicle, model, count, settings.qp, settings.scaling)
         solver = Osqp(settings.admm)

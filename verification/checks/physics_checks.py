@@ -120,7 +120,7 @@ def constant_demand(context: Context) -> Iterator[Check]:
     worst, shown = 0.0, []
     for net_w in (1000.0, 4000.0, 9000.0, 20000.0):
         off_w = float(equations.internal_w(vehicle.trip.soc_mean, net_w))
-        fields = (duration / n, net_w, 10.0, off_w, 0.0, 0.0, 0.0, 0.0)
+        fields = (duration / n, net_w, 10.0, off_w, 0.0, net_w, off_w, 0.0, 0.0, 0.0)
         stages = Stages(*(np.full(n, value) for value in fields))
         about = Linearisation.constant(n, 50.0)
         data = qp.update(stages, vehicle.trip.soc_init, 50.0, about)
