@@ -16,8 +16,10 @@ static mpc_real regen_share(mpc_real speed_mps)
 {
     const mpc_real from_mps = mpc_par.regen_from_mps;
     const mpc_real full_mps = mpc_par.regen_full_mps;
-    const mpc_real blends = (full_mps > REAL(0.0)) ? (full_mps - from_mps) : REAL(1.0);
-    const mpc_real share = (full_mps > REAL(0.0)) ? ((speed_mps - from_mps) / blends) : REAL(1.0);
+    mpc_real share = REAL(1.0);
+    if (full_mps > REAL(0.0)) {
+        share = (speed_mps - from_mps) / (full_mps - from_mps);
+    }
     return real_clip(share, REAL(0.0), REAL(1.0));
 }
 
