@@ -56,14 +56,14 @@ static void count(mpc_forecast *forecast, int32_t second, int32_t times)
     }
     to->seconds += times;
     const int32_t must = must_run(net_w, forecast->trip.speed_mps[second]);
-    const mpc_real free = (must != 0) ? REAL(0.0) : sign;
+    const mpc_real if_free = (must != 0) ? REAL(0.0) : sign;
     const mpc_real off_w = mpc_map_planned_internal_w(net_w);
     to->musts += times * must;
     add_to(&to->net_w, sign * net_w);
     add_to(&to->speed_mps, sign * forecast->trip.speed_mps[second]);
     add_to(&to->internal_off_w, sign * off_w);
-    add_to(&to->free_net_w, free * net_w);
-    add_to(&to->free_internal_off_w, free * off_w);
+    add_to(&to->free_net_w, if_free * net_w);
+    add_to(&to->free_internal_off_w, if_free * off_w);
 }
 
 static void sum_up(mpc_forecast *forecast)

@@ -141,7 +141,8 @@ def _spoilt(preview: Preview, rng: np.random.Generator) -> Preview:
         values[2] = np.abs(values[2]) * 1e-3
         values += [
             rng.uniform(0, 1, n),
-            *values[1::2],
+            values[1],  # of the seconds with a choice: as of all
+            values[3],
             rng.uniform(0, 60, n),
             *(rng.uniform(0, 3e6, n) for _ in range(2)),
         ]
