@@ -233,9 +233,9 @@ static void fill_long(const mpc_forecast *forecast, int32_t is_arriving, mpc_in 
         in->long_internal_off_w[k] = share * mean_of(&of->internal_off_w, seconds);
         in->long_must_share[k] = share * ((mpc_real)of->musts / seconds);
         /* where none is free, the means of all */
-        const int32_t free_seconds = of->seconds - of->musts;
-        const int32_t some = ((is_masked == 0) && (free_seconds > 0)) ? 1 : 0;
-        const mpc_real free_s = (some != 0) ? (mpc_real)free_seconds : REAL(1.0);
+        const int32_t some = ((is_masked == 0) && (of->seconds > of->musts)) ? 1 : 0;
+        const mpc_real left_s = (mpc_real)of->seconds - (mpc_real)of->musts; /* no overflow */
+        const mpc_real free_s = (some != 0) ? left_s : REAL(1.0);
         in->long_free_net_w[k] = (some != 0) ? mean_of(&of->free_net_w, free_s) : in->long_net_w[k];
         in->long_free_internal_off_w[k] = (some != 0) ? mean_of(&of->free_internal_off_w, free_s)
                                                       : in->long_internal_off_w[k];

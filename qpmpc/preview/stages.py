@@ -15,7 +15,8 @@ from qpmpc.vehicle.parameters import Vehicle
 
 LEAST_SHARE = 1e-6  # of a second in a day: below it is rounding
 FIELDS = 7  # of `Stages` that are means or sums of seconds
-OF_FREE = slice(5, 7)  # those of the seconds that leave a choice alone
+OF_FREE = slice(5, 7)  # P0 and l(P0) of the seconds that leave a choice
+OF_ALL = [1, 3]  # the same of all seconds
 
 
 @dataclass(frozen=True)
@@ -153,7 +154,7 @@ class StageBuilder:
         fields = np.zeros((FIELDS, self.count))
         trace = Trace(preview.short_demand_w[:seen], preview.short_speed_mps[:seen])
         fields[:, :seen] = _fields(trace, self._vehicle)
-        _mean_of_free(fields[:, :seen])
+        fields[OF_FREE, :seen] = fields[OF_ALL, :seen]  # of one second: its own
         long = preview.long
         fields[:, n:] = (
             long.duration_s,
@@ -193,7 +194,7 @@ class StageBuilder:
         if self.settings.classes == 1:  # an averaged preview has only the mean demand
             fields[3] = internal_off_w(self._vehicle, fields[1])
             fields[4] = must_run(self._vehicle, fields[1], fields[2])
-            fields[OF_FREE] = fields[[1, 3]]
+            fields[OF_FREE] = fields[OF_ALL]
         else:
             _mean_of_free(fields)
         return fields
@@ -224,7 +225,7 @@ def _mean_of_free(fields: NDArray[np.float64]) -> None:
     """From means over all seconds to those over the seconds that leave a choice, where any do."""
     share = 1.0 - fields[4]
     some = share > LEAST_SHARE
-    fields[OF_FREE] = np.where(some, fields[OF_FREE] / np.where(some, share, 1.0), fields[[1, 3]])
+    fields[OF_FREE] = np.where(some, fields[OF_FREE] / np.where(some, share, 1.0), fields[OF_ALL])
 
 
 def _demand_class(demand_w: NDArray[np.float64], settings: HorizonSettings) -> NDArray[np.intp]:

@@ -164,6 +164,8 @@ int main(int argc, char **argv)
             in.long_duration_s[i] = (mpc_real)((i * 13) % 60);
             in.long_net_w[i] = (mpc_real)((i * 7919) % 15000 - 3000);
             in.long_internal_off_w[i] = (mpc_real)1.02 * in.long_net_w[i];
+            in.long_free_net_w[i] = in.long_net_w[i];
+            in.long_free_internal_off_w[i] = in.long_internal_off_w[i];
             in.long_fall_j[i] = (mpc_real)((i * 3251) % 90000);
             in.long_rise_j[i] = (mpc_real)((i * 6133) % 90000);
         }

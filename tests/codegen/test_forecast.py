@@ -27,7 +27,11 @@ CAR = load_vehicle()
 SETTINGS = ControllerSettings()
 TWO_HOURS_S = 7200
 
-POWERS = ("demand_w", "short_demand_w", "long_net_w", "long_internal_off_w")
+POWERS = (
+    *("demand_w", "short_demand_w", "long_net_w", "long_internal_off_w"),
+    *("long_free_net_w", "long_free_internal_off_w"),
+)
+SHARES = ("long_must_share",)
 SPEEDS = ("speed_mps", "short_speed_mps", "long_speed_mps")
 SWINGS = ("long_fall_j", "long_rise_j")
 # f64: Python takes differences of a running sum over the whole trip, 1e8 at most, whose last digit
@@ -64,12 +68,17 @@ def numbers(inputs: object, names: tuple[str, ...]) -> np.ndarray:
 
 
 def assert_same_inputs(
-    library: HostLibrary, truth: Trace, said: Trace | None = None, settings=SETTINGS, steps=None
+    library: HostLibrary,
+    truth: Trace,
+    said: Trace | None = None,
+    settings=SETTINGS,
+    steps=None,
+    vehicle=CAR,
 ) -> None:
     """Fill in the input of every second (or of those named) in Python and in C."""
     truth = rounded(truth, library.precision)
     said = None if said is None else rounded(said, library.precision)
-    preview = StageBuilder(CAR, truth, said or truth, settings.mh_qp.horizon)
+    preview = StageBuilder(vehicle, truth, said or truth, settings.mh_qp.horizon)
     python, ours = InputBuilder(preview.preview), ForecastInputs(library, truth, said)
     want, have = library.input_type(), library.input_type()
     relative, power_w, speed_mps, energy_j = TOLERANCE[library.precision]
@@ -80,7 +89,12 @@ def assert_same_inputs(
         assert have.short_count == want.short_count
         assert list(have.long_duration_s) == list(want.long_duration_s)
         assert list(have.long_rises) == list(want.long_rises)
-        for names, absolute in ((POWERS, power_w), (SPEEDS, speed_mps), (SWINGS, energy_j)):
+        for names, absolute in (
+            (POWERS, power_w),
+            (SPEEDS, speed_mps),
+            (SWINGS, energy_j),
+            (SHARES, 1e-6),
+        ):
             np.testing.assert_allclose(
                 numbers(have, names), numbers(want, names), rtol=relative, atol=absolute
             )
@@ -94,6 +108,13 @@ def cut(name: str, steps: int) -> Trace:
 @pytest.mark.parametrize("name", cycle_names())
 def test_every_second_of_every_cycle_equals_python(library, name) -> None:
     assert_same_inputs(library, Trace.of(load_cycle(name), CAR))
+
+
+def test_a_weak_battery_and_its_seconds_without_a_choice_equal_python() -> None:
+    car = load_vehicle("prius-2016")
+    trip = Trace.of(load_cycle("udds"), car)
+    for precision in ("f64", "f32"):
+        assert_same_inputs(library_of(precision, vehicle=car), trip, vehicle=car)
 
 
 def test_a_trip_of_two_hours_loses_no_digits(library) -> None:
@@ -231,9 +252,10 @@ def test_a_trip_driven_with_either_statistics_is_one_trip(library, wrong) -> Non
 # --- demand --------------------------------------------------------------------------------------
 
 
-# Parts of the force, inertia and slope, may cancel: round-off counts in the largest part.
+# Parts of the force, inertia and slope, may cancel: round-off counts in the largest part. The last
+# car has the road load of the cold, and friction brakes at low speed.
 @pytest.mark.parametrize(("precision", "digits"), [("f64", 1e-15), ("f32", 1e-6)])
-@pytest.mark.parametrize("vehicle", ["prius-nimh", "prius-2016"])  # cold road load, friction brakes
+@pytest.mark.parametrize("vehicle", ["prius-nimh", "prius-liion", "prius-2016"])
 def test_demand_of_speed_acceleration_and_grade_equals_python(vehicle, precision, digits) -> None:
     car, flat = load_vehicle(vehicle), load_cycle("wltc-3b")
     grade = np.random.default_rng(1).uniform(-0.1, 0.1, len(flat.time_s))

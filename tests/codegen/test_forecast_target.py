@@ -110,7 +110,8 @@ def test_cost_on_the_target_is_as_documented_and_does_not_grow_with_the_trip(tmp
         assert list(have["long_duration_s"]) == list(want.long_duration_s)
         assert list(have["long_rises"]) == list(want.long_rises)
         assert have["short_count"] == want.short_count
-        of = {"net_w": 0.01, "internal_off_w": 0.01, "speed_mps": 1e-5, "must_share": 1e-6}
+        powers = ("net_w", "internal_off_w", "free_net_w", "free_internal_off_w")
+        of = dict.fromkeys(powers, 0.01) | {"speed_mps": 1e-5, "must_share": 1e-6}
         for name, absolute in of.items():
             np.testing.assert_allclose(
                 have[f"long_{name}"], getattr(want, f"long_{name}"), rtol=0.0, atol=absolute

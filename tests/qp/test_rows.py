@@ -104,14 +104,19 @@ def test_coolant_row_is_the_derivative_of_the_heat_balance(h, speed_mps, t_degc,
 def test_other_rows_hold_exactly_where_the_model_allows(h, net_w, data):
     """Fuel, battery and power limits at points of the model: slack of each piece, by hand."""
     stages, about = two_stages(h, net_w, 10.0, 60.0, 0.5, 8e3)
+    free_w = data.draw(st.sampled_from([net_w, net_w - 4e3]))
+    free_off_w = float(EQUATIONS.internal_w(CAR.trip.soc_init, free_w))
+    free = {"free_net_w": free_w, "free_internal_off_w": free_off_w}
+    stages = replace(stages, **{name: np.full(2, value) for name, value in free.items()})
     a, lower, upper, rows = in_si_units(stages, about, 0.6, 60.0)
     x = np.zeros((2, a.shape[-1]))
     x[0, Var.SOC] = data.draw(st.floats(0.4, 0.8))
     on = x[1, Var.ON] = data.draw(st.floats(0.0, 1.0))
     power = x[1, Var.P_ENG] = on * data.draw(st.floats(0.0, 50e3))
-    off_w = stages.internal_off_w[1]
-    pieces = MODEL.battery.slope * (on * net_w - power) + MODEL.battery.intercept * on
-    x[1, Var.INTERNAL] = pieces.max() + (1.0 - on) * off_w
+    # the engine takes the seconds without a choice first: what it leaves is the mean of the others
+    taken_w = net_w - (1.0 - on) * free_w
+    pieces = MODEL.battery.slope * (taken_w - power) + MODEL.battery.intercept * on
+    x[1, Var.INTERNAL] = pieces.max() + (1.0 - on) * free_off_w
     x[1, Var.FUEL] = (MODEL.fuel.slope * power + MODEL.fuel.intercept * on).max()
     x[1, Var.SOC] = x[0, Var.SOC] - h * x[1, Var.INTERNAL] / MODEL.battery_energy_j
     over = np.einsum("rkv,kv->r", a[1], x) - lower[1]
