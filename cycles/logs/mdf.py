@@ -1,11 +1,7 @@
 """Measurement files of the automotive industry (ASAM MDF 3 and 4): channels as columns."""
 
-import gc
-import logging
 import re
-import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from qpmpc.cycles.cycle import Floats
+from qpmpc.cycles.logs.apart import read_apart
 from qpmpc.cycles.logs.choose import columns_of, scale_of
 from qpmpc.cycles.logs.columns import ASSUMED, LEFT_OUT, READ, LogColumns, Said
 from qpmpc.cycles.logs.extra import need
@@ -59,33 +56,28 @@ def read_mdf(path: Path, options: LogOptions) -> LogColumns:
         if stated:
             raise InputError(f"{path}: {option} has no effect on an MDF file")
     _check_file(path)
+    return read_apart(read_here, path, options)
+
+
+def read_here(path: Path, options: LogOptions) -> LogColumns:
+    """Read a file in this process, which a broken one may end.
+
+    Raises
+    ------
+    InputError
+        As `read_mdf`.
+    """
     from asammdf import MDF
 
-    with _quiet():
-        try:
-            with MDF(path) as file:
-                return _read(path, file, options)
-        except InputError:
-            raise
-        except Exception as error:  # of asammdf: the file is another's bytes
-            failure = shown_value(str(error))
-        gc.collect()
-    raise InputError(f"{path}: not an MDF file that asammdf reads: {failure}")
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep asammdf's own lines about a broken file from stderr, and those of its destructor.
-
-    That fails on what its constructor had not made.
-    """
-    logger, hook = logging.getLogger("asammdf"), sys.unraisablehook
-    disabled = logger.disabled
-    sys.unraisablehook, logger.disabled = (lambda _: None), True
     try:
-        yield
-    finally:
-        sys.unraisablehook, logger.disabled = hook, disabled
+        with MDF(path) as file:
+            return _read(path, file, options)
+    except InputError:
+        raise
+    except Exception as error:  # of asammdf: the file is another's bytes
+        raise InputError(
+            f"{path}: not an MDF file that asammdf reads: {shown_value(str(error))}"
+        ) from None
 
 
 def _check_file(path: Path) -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from small_program import program
 
@@ -58,17 +58,23 @@ def test_it_is_concave(car, step, soc, t_cl, on, seed):
 
 @settings(deadline=None, max_examples=30)
 @given(CARS, st.integers(0, 58), st.floats(0.58, 0.62), st.floats(51.0, 88.0), st.booleans())
+@example("prius-nimh", 0, 0.609375, 51.0, False)
 def test_newton_finds_its_top(car, step, soc, t_cl, on):
     """From two sides, to the same value, which never falls on the way; the limits can be kept."""
     p, _ = program(car, step, soc, t_cl, on)
     # one whose end is eased to what can just be reached has its top at endless prices
     assume(p.soc_low[-1] >= TARGET)
     n = len(p.duration_s)
-    tops = []
-    for guess in (60.0, 300.0):
+
+    def top(guess: float, rounds: int) -> float:
         values = []
         start = Multipliers(np.full(n, guess), np.zeros(n))
-        top = newton(p, start, 60, MOST, lambda here, to=values: to.append(here.value))
-        assert (np.diff([*values, top.value]) >= 0.0).all()
-        tops.append(top.value)
-    assert tops[0] == pytest.approx(tops[1], abs=0.02)
+        found = newton(p, start, rounds, MOST, lambda here: values.append(here.value)).value
+        assert (np.diff([*values, found]) >= 0.0).all()
+        return found
+
+    # 60 rounds do but where the same switch has to keep the coolant and the SOC at the end, one at
+    # a time: 17 of 1,800 states, most of them drawn on that edge
+    few = top(60.0, 60), top(300.0, 60)
+    if few[0] != pytest.approx(few[1], abs=0.02):
+        assert top(60.0, 1000) == pytest.approx(top(300.0, 1000), abs=0.02)
