@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from plain import plain_car
 
 from qpmpc.controllers.base import Controller, Decision
 from qpmpc.cycles import Cycle
@@ -24,13 +25,14 @@ def test_a_climb_that_asks_too_much_power_is_beyond_the_car(controller) -> None:
     (line,) = [line for line in row["remarks"] if "beyond the car" in line]
     first = int(line.split("from ")[1].split()[0])
     asked_w = run.trajectory.demand_w + 400.0
-    most_w = 71e3 + 27e3  # rated engine and battery
+    car = load_vehicle()
+    most_w = car.engine.power_max_w + car.battery_discharge_max_w
     assert first == int(np.argmax(asked_w > most_w))
     assert f"demand {(asked_w.max() - most_w) / 1e3:.3g} kW" in line or "SOC" in line
 
 
 def test_a_climb_that_overheats_the_engine_says_by_how_much() -> None:
-    row = simulate(constant(25.0, 0.10, 600), "rule-based").summary()
+    row = simulate(constant(25.0, 0.10, 600), "rule-based", plain_car()).summary()
     (line,) = [line for line in row["remarks"] if "beyond the car" in line]
     assert f"coolant {row['violations']['t_cl_degc']:.2g} K outside 40..90 °C" in line
     assert not row["comparable"]

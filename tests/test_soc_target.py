@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from plain import plain_car
 
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
@@ -60,7 +61,7 @@ def test_less_charge_at_arrival_costs_less_fuel_by_what_it_is_worth(short):
 
 @pytest.mark.parametrize("asked", [EMPTIER, FULLER], ids=["emptier", "fuller"])
 def test_near_the_optimum(short, asked):
-    trip = Trip(short, load_vehicle("prius-liion").with_settings(asked))
+    trip = Trip(short, plain_car("paper-liion").with_settings(asked))
     optimum = simulate(trip, "dp", settings=QUICK)
     run = simulate(trip, "mh-qp")
     # measured 0.2 and 0.3 %; shipped cycles without a target of their own are at 0.1 to 0.5 %

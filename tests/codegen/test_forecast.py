@@ -111,7 +111,7 @@ def test_every_second_of_every_cycle_equals_python(library, name) -> None:
 
 
 def test_a_weak_battery_and_its_seconds_without_a_choice_equal_python() -> None:
-    car = load_vehicle("prius-2016")
+    car = load_vehicle()
     trip = Trace.of(load_cycle("udds"), car)
     for precision in ("f64", "f32"):
         assert_same_inputs(library_of(precision, vehicle=car), trip, vehicle=car)
@@ -255,7 +255,7 @@ def test_a_trip_driven_with_either_statistics_is_one_trip(library, wrong) -> Non
 # Parts of the force, inertia and slope, may cancel: round-off counts in the largest part. The last
 # car has the road load of the cold, and friction brakes at low speed.
 @pytest.mark.parametrize(("precision", "digits"), [("f64", 1e-15), ("f32", 1e-6)])
-@pytest.mark.parametrize("vehicle", ["prius-nimh", "prius-liion", "prius-2016"])
+@pytest.mark.parametrize("vehicle", ["prius-nimh", "prius-liion", "paper-nimh"])
 def test_demand_of_speed_acceleration_and_grade_equals_python(vehicle, precision, digits) -> None:
     car, flat = load_vehicle(vehicle), load_cycle("wltc-3b")
     grade = np.random.default_rng(1).uniform(-0.1, 0.1, len(flat.time_s))

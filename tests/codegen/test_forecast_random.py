@@ -28,7 +28,7 @@ static mpc_road road(int32_t steps)
     mpc_real *const speed_mps = malloc(sizeof(mpc_real) * (size_t)(steps + (steps == 0)));
     for (int32_t k = 0; k < steps; k++) {
         demand_w[k] = (mpc_real)(below(200001) - 100000);
-        speed_mps[k] = (mpc_real)below(91);
+        speed_mps[k] = (mpc_real)below(89);
     }
     const mpc_road made = {demand_w, speed_mps, steps};
     return made;

@@ -305,7 +305,7 @@ def test_a_run_says_which_folder_cannot_be_used_and_why(folder, caplog):
     speed_mps = np.concatenate([np.linspace(0.0, 10.0, 10), np.full(10, 10.0)])
     run = simulate(Cycle("short", np.arange(20.0), speed_mps, np.zeros(20)), "mh-qp")
     assert run.summary()["solver"]["implementation"] == "c"  # all the same
-    (remark,) = run.remarks
+    _of_the_battery, remark = run.remarks
     assert str(folder) in remark
     assert "mode 777" in remark
     assert [record.getMessage() for record in caplog.records] == [remark]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from plain import plain_car
 
 from qpmpc.closed_loop import drive
 from qpmpc.codegen.c_compiler import compiler
@@ -19,13 +20,14 @@ from qpmpc.cycles import Cycle
 from qpmpc.results import Run
 from qpmpc.simulation import simulate
 from qpmpc.trip import Observation, Trip
-from qpmpc.vehicle import Command, Plant, Vehicle, load_vehicle
+from qpmpc.vehicle import Command, Plant, Vehicle
 from qpmpc.vehicle.must_run import must_run, too_fast
 from qpmpc.verification.dynamic_programming.power_limits import power_limits
 from qpmpc.verification.nonlinear.problem import NlpProblem, NlpVar
 
 LIMIT_MPS = 25.0
-FREE, CAR = load_vehicle(), load_vehicle().with_settings({"engine.electric_max_mps": LIMIT_MPS})
+FREE = plain_car()
+CAR = FREE.with_settings({"engine.electric_max_mps": LIMIT_MPS})
 SETTINGS = ControllerSettings()
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
 

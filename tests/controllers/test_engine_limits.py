@@ -2,18 +2,18 @@
 
 import numpy as np
 import pytest
+from plain import plain_car
 
 from qpmpc.engine_runs import ended_runs_s
 from qpmpc.registry import CONTROLLERS
 from qpmpc.results import OPTIMUM
 from qpmpc.simulation import simulate
 from qpmpc.trajectory import Trajectory
-from qpmpc.vehicle import load_vehicle
 from qpmpc.vehicle.plant import LONG_AGO_S
 from qpmpc.verification.safety.every_command import EveryCommand, Seconds
 
 MIN_ON_S, MIN_OFF_S, RAMP_W_PER_S = 4, 2, 9.5e3
-CAR = load_vehicle().with_settings(
+CAR = plain_car().with_settings(
     {
         "engine.start_fuel_g": 0.2,
         "engine.start_energy_j": 3.5e3,

@@ -3,13 +3,14 @@
 import math
 
 import pytest
+from plain import plain_car
 
 from qpmpc.controllers.monitor import Flag, InputMonitor
 from qpmpc.trip import Observation
-from qpmpc.vehicle import Command, Plant, PlantState, load_vehicle
+from qpmpc.vehicle import Command, Plant, PlantState
 from qpmpc.vehicle.plant import LONG_AGO_S
 
-CAR = load_vehicle().with_settings(
+CAR = plain_car().with_settings(
     {"engine.start_energy_j": 13.5e3, "engine.start_fuel_g": 5.0, "engine.ramp_w_per_s": 9.5e3}
 )
 MOST_W = CAR.engine.power_max_w

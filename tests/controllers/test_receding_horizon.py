@@ -240,7 +240,9 @@ def test_a_plan_that_is_not_finite_does_not_drive_and_the_run_says_so() -> None:
 
     run = simulate(PART, Wild)
     assert set(run.trajectory.fallback) == {"rule-based"}
-    assert run.summary()["remarks"][:2] == [
+    of_the_battery, *remarks = run.summary()["remarks"]
+    assert of_the_battery.startswith("the battery's power limits are 83 %")
+    assert remarks[:2] == [
         "wild: no plan at 0 s: the plan is not finite",
         "wild: rule-based drove in 120 of 120 s, first at 0 s",
     ]
@@ -272,4 +274,4 @@ def test_after_a_reset_the_run_has_its_own_remarks() -> None:
     first = simulate(trip, controller).remarks
     controller.reset()
     assert simulate(trip, controller).remarks == first
-    assert first[:2] == ("made by hand", "wild: no plan at 0 s: no time")
+    assert first[1:3] == ("made by hand", "wild: no plan at 0 s: no time")

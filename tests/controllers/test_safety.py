@@ -5,13 +5,14 @@ import math
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from plain import plain_car
 
 from qpmpc.controllers.safety import SafetyLayer
 from qpmpc.trip import Observation
-from qpmpc.vehicle import Command, Plant, PlantState, load_vehicle
+from qpmpc.vehicle import Command, Plant, PlantState
 from qpmpc.verification.safety.promise import promise
 
-CAR = load_vehicle()
+CAR = plain_car()
 PLANT = Plant(CAR)
 SAFETY = SafetyLayer(PLANT)
 ANY_NUMBER = st.floats(allow_nan=True, allow_infinity=True)

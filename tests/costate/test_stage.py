@@ -63,8 +63,7 @@ def test_the_curves_are_the_vehicles_own():
         off = np.abs(made.fuel_g_per_s(line.power_w) - line.fuel_g_per_s).max()
         assert off <= FUEL_TOLERANCE_G_PER_S
         assert len(made.slope) < 40
-        battery = vehicle.battery
-        power = np.linspace(-battery.power_charge_max_w, battery.power_discharge_max_w, 401)
+        power = np.linspace(-vehicle.battery_charge_max_w, vehicle.battery_discharge_max_w, 401)
         np.testing.assert_allclose(
             made.internal_w(power), maps.internal_power_w(vehicle.trip.soc_mean, power), atol=1e-6
         )

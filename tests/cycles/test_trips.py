@@ -166,7 +166,7 @@ def test_the_shipped_cars_follow(group: str, vehicle: str) -> None:
     """With half of the battery's power in a second, and without it over a minute."""
     car = load_vehicle(vehicle)
     most = car.engine.power_max_w
-    second = most + car.battery.power_discharge_max_w / 2 - car.battery.aux_power_w
+    second = most + car.battery_discharge_max_w / 2 - car.battery.aux_power_w
     for trip in made(group):
         demand = Trip(trip, car).truth.demand_w
         assert demand.max() < second

@@ -75,7 +75,7 @@ def test_the_vehicles_curves_are_within_their_proven_bounds(name):
     vehicle = load_vehicle(name)
     model = PwaModel.of(vehicle)
     maps = BatteryMaps(vehicle.battery)
-    power = np.linspace(-25e3, 27e3, 50_011)
+    power = np.linspace(-vehicle.battery_charge_max_w, vehicle.battery_discharge_max_w, 50_011)
     line = OptimalLine(vehicle.engine)
     p_eng = np.linspace(0.0, 71e3, 50_011)
     t = alpha_samples(vehicle)[0]
@@ -104,7 +104,9 @@ def test_vehicles_in_other_weather_share_the_fits_and_nobody_can_change_them() -
     ours = PwaModel.of(vehicle)
     cold = PwaModel.of(vehicle.with_settings({"thermal.t_amb_degc": -12.5}))
     assert cold.fuel is ours.fuel
-    assert cold.battery is ours.battery
+    assert cold.battery.breakpoints[-1] < ours.battery.breakpoints[-1]  # it gives less there
+    as_strong = PwaModel.of(vehicle.with_settings({"thermal.cabin_heat_w": 2e3}))
+    assert as_strong.battery is ours.battery
     assert cold.alpha is ours.alpha
     arctic = PwaModel.of(vehicle.with_settings({"thermal.t_amb_degc": -35.0}))
     assert arctic.alpha.breakpoints[0] == -35.0  # its range begins there

@@ -72,6 +72,7 @@ def test_tightness_of_the_relaxation_is_told(page, rows):
 
 def changed(runs, **changes):
     rows = compare_runs(runs)
+    rows[0]["comparable"] = True  # whatever the rules reach on a trip this short
     rows[1].update(changes)
     return Page(compare_html(runs, rows, ControllerSettings(), {})).text
 

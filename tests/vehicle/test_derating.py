@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from plain import plain_car
 
 from qpmpc.codegen.values import values_of
 from qpmpc.controllers.settings import MhQpSettings, RuleBasedSettings
@@ -12,7 +13,7 @@ from qpmpc.errors import InputError
 from qpmpc.pwa.model import PwaModel, battery_samples
 from qpmpc.simulation import simulate
 from qpmpc.trip import Trip
-from qpmpc.vehicle import Command, Plant, PlantState, load_vehicle
+from qpmpc.vehicle import Command, Plant, PlantState
 from qpmpc.vehicle.belief import Belief
 from qpmpc.vehicle.capability import Capability
 from qpmpc.vehicle.engine import optimal_line
@@ -21,7 +22,7 @@ from qpmpc.verification.bounds.relaxed_trip import relaxed_trip
 from qpmpc.verification.independent.equations import Equations
 from qpmpc.verification.nonlinear.mh_nlp import MhNlp
 
-RATED = load_vehicle().with_settings({"thermal.t_amb_degc": -20.0})
+RATED = plain_car().with_settings({"thermal.t_amb_degc": -20.0})
 COLD = RATED.with_settings({"battery.derating_share_per_k": 0.02})  # 40 % are left
 # the same limits, as rated ones
 RATED_SO = RATED.with_settings(

@@ -22,7 +22,6 @@ def _text() -> str:
 def test_shipped_vehicles_load_and_the_default_comes_first():
     assert vehicle_names() == (
         "prius-nimh",
-        "prius-2016",
         "prius-liion",
         "prius-prime",
         "sonata-hybrid",
@@ -51,7 +50,7 @@ def test_a_vehicle_file_loads_like_the_shipped_one(tmp_path):
         ("min_off_s = 2 ", "min_off_s = 601 ", "engine.min_off_s"),
         ("ramp_w_per_s = 11833.0", "ramp_w_per_s = 0.0", "engine.ramp_w_per_s"),
         ("soc_init = 0.6", "soc_init = 0.95", "soc_init"),
-        ("power_discharge_max_w = 27000.0", "power_discharge_max_w = 60000.0", "power_discharge"),
+        ("power_discharge_max_w = 20500.0", "power_discharge_max_w = 60000.0", "power_discharge"),
         ("torque_speed_rpm = [1000,", "torque_speed_rpm = [9000,", "torque_speed_rpm"),
         ("[chassis]", "[chassis", "TOML"),
         ("mass_kg = 1530.9", f"mass_kg = {'9' * 5000}", "TOML"),

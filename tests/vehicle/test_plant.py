@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from plain import plain_car
 
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.vehicle import Command, Plant, PlantState, demand_w, load_vehicle
@@ -13,9 +14,9 @@ from qpmpc.vehicle.demand import tractive_force_n
 from qpmpc.vehicle.plant import BOILING_DEGC, LONG_AGO_S
 from qpmpc.verification.independent.equations import Equations
 
-PLANT = Plant(load_vehicle())
+PLANT = Plant(plain_car())
 STARTING = Plant(
-    load_vehicle().with_settings(
+    plain_car().with_settings(
         {"engine.start_fuel_g": 0.2, "engine.start_energy_j": 3.5e3, "engine.ramp_w_per_s": 9.5e3}
     )
 )
@@ -88,7 +89,7 @@ def test_discharge_lowers_soc_and_the_engine_burns_only_when_on():
 )
 def test_coolant_cools_as_the_differential_equation_says(t_amb_degc, seconds):
     # C dT/dt = -UA (T - T_amb) - Q: T falls from 60 to 40 C in a time known in closed form.
-    vehicle = load_vehicle().with_settings(
+    vehicle = plain_car().with_settings(
         {"thermal.t_amb_degc": t_amb_degc, "trip.t_cl_init_degc": 60.0}
     )
     plant, speed_mps = Plant(vehicle), 8.0
@@ -127,7 +128,7 @@ def test_commands_beyond_the_limits_are_reported():
 
 
 def test_start_fuel_is_charged_once_a_start():
-    plant = Plant(load_vehicle().with_settings({"engine.start_fuel_g": 0.5}))
+    plant = Plant(plain_car().with_settings({"engine.start_fuel_g": 0.5}))
     first, a = plant.step(PlantState(0.6, 50.0), Command(True, 5e3), 5e3, 5.0)
     _, b = plant.step(
         PlantState(0.6, 50.0, engine_on=first.engine_on), Command(True, 5e3), 5e3, 5.0
@@ -181,18 +182,18 @@ def test_demand_at_constant_speed_is_the_road_load():
     v = np.full(11, 20.0)
     cycle = Cycle("constant", np.arange(11.0), v, np.zeros(11))
     force = 81.278 + 2.93982 * 20.0 + 0.307004 * 400.0
-    np.testing.assert_allclose(demand_w(cycle, load_vehicle()), force * 20.0 / 0.88, rtol=1e-12)
+    np.testing.assert_allclose(demand_w(cycle, plain_car()), force * 20.0 / 0.88, rtol=1e-12)
 
 
 @pytest.mark.parametrize(("name", "mean_kw"), [("nycc", 0.96), ("nedc-truncated", 4.01)])
 def test_mean_demand_of_the_winter_cycles(name, mean_kw):
-    mean = demand_w(load_cycle(name), load_vehicle()).mean() / 1e3
+    mean = demand_w(load_cycle(name), plain_car()).mean() / 1e3
     assert mean == pytest.approx(mean_kw, abs=0.006)  # rounding of the published figure
 
 
 def test_road_load_in_the_cold_is_that_of_the_cold_test():
     """EPA's coefficients of the 2016 Prius at -7 C, from those at 24 C and the share per K."""
-    cold = load_vehicle().with_settings({"chassis.road_load_share_per_k": 0.00358})
+    cold = plain_car().with_settings({"chassis.road_load_share_per_k": 0.00358})
     speed, level = np.array([5.0, 15.0, 30.0]), np.zeros(3)
     force = tractive_force_n(cold.chassis, -7.0, speed, level, level)
     epa = 90.308 + 3.26639 * speed + 0.341127 * speed**2
@@ -204,19 +205,19 @@ def test_road_load_in_the_cold_is_that_of_the_cold_test():
 
 
 def test_friction_brakes_take_over_at_low_speed():
-    blended = load_vehicle().with_settings(
+    blended = plain_car().with_settings(
         {"chassis.regen_from_mps": 1.0, "chassis.regen_full_mps": 3.0}
     )
     speed = np.arange(10.0, -0.1, -1.0)  # mean speeds 9.5 .. 0.5
     cycle = Cycle("stop", np.arange(11.0), speed, np.zeros(11))
-    whole, part = demand_w(cycle, load_vehicle()), demand_w(cycle, blended)
+    whole, part = demand_w(cycle, plain_car()), demand_w(cycle, blended)
     mean = cycle.step_speed_mps
     np.testing.assert_array_equal(part[mean >= 3.0], whole[mean >= 3.0])
     np.testing.assert_allclose(part[mean == 1.5], 0.25 * whole[mean == 1.5])
     assert np.all(part[mean <= 1.0] == 0.0)
     speeding_up = Cycle("go", np.arange(11.0), speed[::-1].copy(), np.zeros(11))
     np.testing.assert_array_equal(
-        demand_w(speeding_up, load_vehicle()), demand_w(speeding_up, blended)
+        demand_w(speeding_up, plain_car()), demand_w(speeding_up, blended)
     )
 
 
@@ -230,7 +231,7 @@ def test_the_independent_equations_ask_for_the_same_power(name):
 
 
 def test_climbing_costs_the_potential_energy():
-    vehicle = load_vehicle()
+    vehicle = plain_car()
     chassis = vehicle.chassis
     flat = Cycle("flat", np.arange(11.0), np.full(11, 15.0), np.zeros(11))
     hill = Cycle("hill", np.arange(11.0), np.full(11, 15.0), np.full(11, 0.05))

@@ -10,6 +10,7 @@ from scipy.optimize import minimize_scalar
 from qpmpc.settings import validated
 from qpmpc.vehicle import Vehicle, load_vehicle
 from qpmpc.vehicle.engine_parameters import LINE, LINE_TOO, MAP
+from qpmpc.vehicle.section import SPEED_MAX_MPS
 from qpmpc.verification.fastsim.one_second import (
     SecondBySecond,
     Tree,
@@ -96,6 +97,7 @@ def believed_vehicle(engine_of: Vehicle | None = None) -> Vehicle:
         "start_energy_j": 0.0,
         "min_on_s": round(component(car, "pt_cntrl")["RGWDB"]["fc_min_time_on_seconds"]),
         "min_off_s": 0,
+        "electric_max_mps": SPEED_MAX_MPS,  # FASTSim has no such limit
     }
     return validated(Vehicle, content, f"the plant fastsim, with the engine of {base['name']}")
 
