@@ -22,7 +22,7 @@ from qpmpc.vehicle.parameters import Vehicle
 MOST_STATES = 32  # of the shortest path, a bit each
 
 CONSTANTS = CONSTANTS_OF_ALL | of_modules(
-    (rows, "SHORTEST_SCALE_S COOL_SHARE"),
+    (rows, "SHORTEST_SCALE_S LEAST_FORCED COOL_SHARE"),
     (stage, "LEAST_RATIO LEAST_PRICE"),
     (funnel, "LEAST_RESPONSE UNLIMITED"),
     (

@@ -58,8 +58,10 @@ def exact(p: Program, layout: Layout) -> tuple[float, float]:
     cost of the best plan, and a bound on it (HiGHS stops before they are equal)
     """
     n = len(p.duration_s)
-    per = POWERS + 3  # on at each power, and per stage: waste, slack, starts; then SOC and T
-    size = n * (per + 2)
+    # on at each power where there is a choice, and where there is none; per stage: waste, slack,
+    # starts, SOC and T
+    per = 2 * POWERS + 5
+    size = n * per
     cost, low, high = np.zeros(size), np.zeros(size), np.full(size, np.inf)
     whole = np.zeros(size)
     rows, lower, upper = [], [], []
@@ -73,17 +75,23 @@ def exact(p: Program, layout: Layout) -> tuple[float, float]:
         upper.append(most)
 
     def at(k: int, j: int) -> int:
-        return k * (per + 2) + j
+        return k * per + j
 
-    waste, slack, start, soc, t_cl = (POWERS + j for j in range(5))
+    waste, slack, start, soc, t_cl = (2 * POWERS + j for j in range(5))
     for k in range(n):
-        powers = np.linspace(p.low_w[k], p.high_w[k], POWERS)
+        free = np.linspace(p.low_w[k], p.high_w[k], POWERS)
+        forced = np.linspace(p.forced_low_w[k], p.forced_high_w[k], POWERS)
+        powers = np.concatenate([free, forced])
+        nets = np.repeat([p.net_w[k], p.forced_net_w[k]], POWERS)
+        parts = np.repeat([p.free[k], p.forced[k]], POWERS)
         curves = p.curves if k < layout.short else p.shared
-        fuel, internal = curves.fuel_g_per_s(powers), curves.internal_w(p.net_w[k] - powers)
-        on = {at(k, j): 1.0 for j in range(POWERS)}
-        for j in range(POWERS):
-            cost[at(k, j)], high[at(k, j)], whole[at(k, j)] = p.fuel_cost[k] * fuel[j], 1.0, 1
-        row(on, float(p.must[k]), float(p.can[k]))
+        fuel, internal = curves.fuel_g_per_s(powers), curves.internal_w(nets - powers)
+        high[k * per : k * per + 2 * POWERS] = 1.0
+        whole[k * per : k * per + POWERS] = 1
+        for j in range(2 * POWERS):
+            cost[at(k, j)] = p.fuel_cost[k] * parts[j] * fuel[j]
+        row({at(k, j): 1.0 for j in range(POWERS)}, float(p.must[k]), float(p.can[k]))
+        row({at(k, POWERS + j): 1.0 for j in range(POWERS)}, 1.0, 1.0)
         cost[at(k, slack)] = p.slack_g_per_k
         cost[at(k, start)] = p.start_fuel_g
         cost[at(k, t_cl)] = p.price_t[k]
@@ -92,11 +100,13 @@ def exact(p: Program, layout: Layout) -> tuple[float, float]:
         row({at(k, t_cl): 1.0, at(k, slack): 1.0}, p.t_low[k], np.inf)
         row({at(k, t_cl): 1.0, at(k, slack): -1.0}, -np.inf, p.t_high[k])
         c = p.charge_per_w[k]
-        drawn = {at(k, j): c * (internal[j] - p.off_w[k]) for j in range(POWERS)}
+        off = np.repeat([p.off_w[k], 0.0], POWERS)
+        drawn = {at(k, j): c * parts[j] * (internal[j] - off[j]) for j in range(2 * POWERS)}
         drawn |= {at(k, soc): 1.0, at(k, waste): 1.0, at(k, start): p.cranking_soc}
-        right = -c * p.off_w[k]
+        right = -c * p.free[k] * p.off_w[k]
         heat = {
-            at(k, j): p.per_power[k] * powers[j] - p.per_fuel[k] * fuel[j] for j in range(POWERS)
+            at(k, j): parts[j] * (p.per_power[k] * powers[j] - p.per_fuel[k] * fuel[j])
+            for j in range(2 * POWERS)
         }
         heat |= {at(k, t_cl): p.t_end[k], at(k, start): -p.start_k[k]}
         warm = p.settled[k]

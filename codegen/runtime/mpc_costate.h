@@ -17,9 +17,22 @@ typedef struct {
     mpc_real least_of_charge; /* responses of a stage that has none of its own now */
     mpc_real least_of_heat;
     mpc_real width;  /* cost over which on and off are smoothed, g */
-    mpc_real must;   /* 1 where the engine has to run, else 0 */
+    mpc_real must;   /* 1 where the engine has to run all the time, else 0 */
     mpc_real cannot; /* 1 where it must not, else 0 */
+    mpc_real forced; /* share of the seconds without a choice in a stage that has both, and the rest
+                      */
+    mpc_real free;
+#if MPC_STARTS
+    mpc_real rises; /* of the on-share */
+#endif
 } mpc_costate_program;
+
+/* Engine power with its fuel and the internal power of the battery. */
+typedef struct {
+    mpc_real power_w;
+    mpc_real fuel_g_per_s;
+    mpc_real internal_w;
+} mpc_drive;
 
 /* The smoothed dual at some multipliers. */
 typedef struct {
@@ -32,11 +45,11 @@ typedef struct {
     mpc_real cross;
     mpc_real of_heat; /* of the coolant's heat to nu */
     mpc_real share;   /* sigma */
-    mpc_real power_w; /* while on, with its fuel and internal power */
-    mpc_real fuel_g_per_s;
-    mpc_real internal_w;
-    mpc_real on_g; /* cost of the whole stage on, off, and of a start */
+    mpc_drive on;     /* while on, where there is a choice */
+    mpc_drive forced; /* where there is none, in a stage that has both */
+    mpc_real on_g;    /* cost of the whole stage on, off, and of a start */
     mpc_real off_g;
+    mpc_real forced_g; /* what the seconds without a choice add */
 #if MPC_STARTS
     mpc_real start_g;
 #endif
@@ -78,14 +91,19 @@ typedef struct {
 
 /* Least of a stage with its engine on. */
 typedef struct {
-    mpc_real power_w;
-    mpc_real fuel_g_per_s;
-    mpc_real internal_w;
+    mpc_drive drive;
     mpc_real cost;
     mpc_real slope_g_per_j;
     mpc_real ratio;
     mpc_real gives;
 } mpc_least;
+
+/* Net power, and the limits of the engine. */
+typedef struct {
+    mpc_real net_w;
+    mpc_real low_w;
+    mpc_real high_w;
+} mpc_asked;
 
 /* Prices of fuel, engine power and internal power of the battery. */
 typedef struct {

@@ -37,7 +37,7 @@ static mpc_real price_coolant(mpc_state *state, int32_t which)
 /* Price of a start per on-share, of either sign. */
 static mpc_real start_price(const mpc_stage *stage, const mpc_costate_dual *dual)
 {
-    return real_max(dual->start_g, REAL(0.0)) * stage->road.rises;
+    return real_max(dual->start_g, REAL(0.0)) * stage->p.rises;
 }
 #endif
 
@@ -96,6 +96,36 @@ typedef struct {
     mpc_real cost_g;
 } way;
 
+static mpc_real heat_of(const mpc_stage_program *of, const mpc_drive *drive)
+{
+    return (of->per_fuel * drive->fuel_g_per_s) - (of->per_power * drive->power_w);
+}
+
+/* Derivatives of the change of SOC to lambda, of that to nu, of the coolant's heat to nu. */
+typedef struct {
+    mpc_real charge;
+    mpc_real cross;
+    mpc_real heat;
+} responses;
+
+/* The seconds of a longer stage in which the engine must run, at a power of their own. */
+static responses drive_forced(mpc_stage *stage, int32_t which)
+{
+    const mpc_costate_program *const p = &stage->p;
+    mpc_costate_dual *const dual = &stage->dual[which];
+    const mpc_prices price = mpc_costate_prices(stage, dual);
+    const mpc_asked asked = {p->of.forced_net_w, p->of.forced_low_w, p->of.forced_high_w};
+    const mpc_least found = mpc_costate_least_shared(&asked, &price);
+    const mpc_real v_charge = p->of.charge_per_w * found.ratio;
+    const mpc_real v_heat = (p->of.per_fuel * found.slope_g_per_j) - p->of.per_power;
+    const mpc_real gives = p->forced * found.gives;
+    dual->forced = found.drive;
+    dual->forced_g = p->forced * found.cost;
+    const responses found_ones = {gives * v_charge * v_charge, gives * v_charge * v_heat,
+                                  gives * v_heat * v_heat};
+    return found_ones;
+}
+
 /* On-share of a stage, and where it leads. */
 static void go_on(mpc_stage *stage, int32_t which, mpc_real starts_g, way *at)
 {
@@ -107,20 +137,22 @@ static void go_on(mpc_stage *stage, int32_t which, mpc_real starts_g, way *at)
     const mpc_real clipped = real_clip(wish, REAL(0.0), REAL(1.0));
     const mpc_real share = real_max((REAL(1.0) - p->cannot) * clipped, p->must);
     const mpc_real turn = above(share * (REAL(1.0) - share), REAL(0.0)) * per_width;
-    const mpc_real by_charge = of->charge_per_w * (stage->road.internal_off_w - dual->internal_w);
-    const mpc_real by_heat = (of->per_fuel * dual->fuel_g_per_s) - (of->per_power * dual->power_w);
+    const mpc_real off_w = stage->road.free_internal_off_w;
+    const mpc_real by_charge = p->free * of->charge_per_w * (off_w - dual->on.internal_w);
+    const mpc_real by_heat = p->free * heat_of(of, &dual->on);
     /* here they are still what the stage gives while on, its slopes */
-    const mpc_real gives = share * dual->of_charge;
+    const mpc_real gives = p->free * share * dual->of_charge;
     const mpc_real v_charge = dual->cross;
     const mpc_real v_heat = dual->of_heat;
     dual->of_charge = (gives * v_charge * v_charge) + (turn * by_charge * by_charge);
     dual->cross = (gives * v_charge * v_heat) + (turn * by_charge * by_heat);
     dual->of_heat = (gives * v_heat * v_heat) + (turn * by_heat * by_heat);
     dual->share = share;
-    mpc_real change = (share * by_charge) - (of->charge_per_w * stage->road.internal_off_w);
-    mpc_real heat = share * by_heat;
+    const mpc_real spent_w = (p->free * off_w) + (p->forced * dual->forced.internal_w);
+    mpc_real change = (share * by_charge) - (of->charge_per_w * spent_w);
+    mpc_real heat = (share * by_heat) + (p->forced * heat_of(of, &dual->forced));
 #if MPC_STARTS
-    const mpc_real starts = real_max(stage->road.rises * (share - at->share), REAL(0.0));
+    const mpc_real starts = real_max(p->rises * (share - at->share), REAL(0.0));
     change -= mpc_par.cranking_soc * starts;
     heat += of->start_k * starts;
 #endif
@@ -130,7 +162,7 @@ static void go_on(mpc_stage *stage, int32_t which, mpc_real starts_g, way *at)
     dual->soc = at->soc;
     dual->t_cl_k = at->t_cl_k;
     at->cost_g += (share * dual->on_g) + ((REAL(1.0) - share) * dual->off_g) + (share * starts_g)
-                  + (REAL(0.5) * p->width * ((share * share) - share));
+                  + (REAL(0.5) * p->width * ((share * share) - share)) + dual->forced_g;
 }
 
 void mpc_costate_dual_at(mpc_state *state, int32_t which)
@@ -141,12 +173,11 @@ void mpc_costate_dual_at(mpc_state *state, int32_t which)
         const mpc_stage_program *const of = &stage->p.of;
         mpc_costate_dual *const dual = &stage->dual[which];
         const mpc_prices price = mpc_costate_prices(stage, dual);
-        const mpc_least on = mpc_costate_least_shared(stage, &price);
-        dual->power_w = on.power_w;
-        dual->fuel_g_per_s = on.fuel_g_per_s;
-        dual->internal_w = on.internal_w;
-        dual->on_g = on.cost;
-        dual->off_g = price.internal * stage->road.internal_off_w;
+        const mpc_asked asked = asked_of(stage);
+        const mpc_least on = mpc_costate_least_shared(&asked, &price);
+        dual->on = on.drive;
+        dual->on_g = stage->p.free * on.cost;
+        dual->off_g = stage->p.free * price.internal * stage->road.free_internal_off_w;
 #if MPC_STARTS
         dual->start_g = (mpc_par.start_fuel_g + (dual->charge * mpc_par.cranking_soc))
                         - (dual->nu * of->start_k);
@@ -158,7 +189,18 @@ void mpc_costate_dual_at(mpc_state *state, int32_t which)
     price_starts(state, which);
     way at = {REAL(0.0), REAL(0.0), (mpc_real)state->watch.good.engine_on, REAL(0.0)};
     for (int32_t k = 0; k < MPC_STAGES; k++) {
-        go_on(&state->stage[k], which, state->search.term[k].price, &at);
+        mpc_stage *const stage = &state->stage[k];
+        mpc_costate_dual *const dual = &stage->dual[which];
+        responses more = {REAL(0.0), REAL(0.0), REAL(0.0)};
+        dual->forced = dual->on;
+        dual->forced_g = REAL(0.0);
+        if (k >= MPC_SHORT) {
+            more = drive_forced(stage, which);
+        }
+        go_on(stage, which, state->search.term[k].price, &at);
+        dual->of_charge += more.charge;
+        dual->cross += more.cross;
+        dual->of_heat += more.heat;
     }
     state->search.constant_g[which] = constant_g;
     state->search.value[which] = at.cost_g + constant_g;

@@ -16,8 +16,15 @@ void mpc_costate_program_fill(mpc_state *state);
 
 /* mpc_costate_stage.c */
 mpc_prices mpc_costate_prices(const mpc_stage *stage, const mpc_costate_dual *dual);
-mpc_least mpc_costate_least_shared(const mpc_stage *stage, const mpc_prices *price);
-mpc_least mpc_costate_least_exact(const mpc_stage *stage, const mpc_prices *price);
+mpc_least mpc_costate_least_shared(const mpc_asked *asked, const mpc_prices *price);
+mpc_least mpc_costate_least_exact(const mpc_asked *asked, const mpc_prices *price);
+
+/* What is asked of a stage in the seconds with a choice. */
+static inline mpc_asked asked_of(const mpc_stage *stage)
+{
+    const mpc_asked asked = {stage->road.free_net_w, stage->p.of.low_w, stage->p.of.high_w};
+    return asked;
+}
 
 /* mpc_costate_funnel.c: prices of the first terms, in `price` */
 void mpc_costate_funnel(mpc_search *search, int32_t count, int32_t steps);

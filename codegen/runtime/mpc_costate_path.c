@@ -30,6 +30,16 @@ static mpc_real start_g(const mpc_costate_dual *cost)
 #endif
 }
 
+static mpc_real rises_of(const mpc_stage *stage)
+{
+#if MPC_STARTS
+    return stage->p.rises;
+#else
+    (void)stage;
+    return REAL(0.0);
+#endif
+}
+
 static int32_t one_less(int32_t count)
 {
     const int32_t less = count - 1;
@@ -139,10 +149,13 @@ static mpc_real block_least(const mpc_stage *block, int32_t which)
             sum += blend(is_on, cost->on_g, cost->off_g) + (wrong * FORBIDDEN_G);
             const int32_t turn = runs - before;
             const mpc_real rise = (mpc_real)turn;
-            sum += start_g(cost) * real_max(block[i].road.rises * rise, REAL(0.0));
+            sum += start_g(cost) * real_max(rises_of(&block[i]) * rise, REAL(0.0));
             before = runs;
         }
         least = real_min(least, sum);
+    }
+    for (int32_t i = 0; i < MPC_CLASSES; i++) {
+        least += block[i].dual[which].forced_g;
     }
     return least;
 }

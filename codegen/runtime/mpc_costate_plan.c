@@ -16,10 +16,9 @@ static void minimise_exactly(mpc_state *state)
         mpc_stage *const stage = &state->stage[k];
         mpc_costate_dual *const dual = &stage->dual[which];
         const mpc_prices price = mpc_costate_prices(stage, dual);
-        const mpc_least on = mpc_costate_least_exact(stage, &price);
-        dual->power_w = on.power_w;
-        dual->fuel_g_per_s = on.fuel_g_per_s;
-        dual->internal_w = on.internal_w;
+        const mpc_asked asked = asked_of(stage);
+        const mpc_least on = mpc_costate_least_exact(&asked, &price);
+        dual->on = on.drive;
         dual->on_g = on.cost;
     }
 }
@@ -48,14 +47,18 @@ static mpc_real follow(mpc_state *state, mpc_real soc_price)
         const mpc_stage_program *const of = &stage->p.of;
         const mpc_costate_dual *const dual = &stage->dual[state->search.here];
         const mpc_real share = stage->x[MPC_VAR_ON];
-        const mpc_real off_w = stage->road.internal_off_w;
-        const mpc_real fuel = share * dual->fuel_g_per_s;
-        const mpc_real power = share * dual->power_w;
-        const mpc_real internal = (share * dual->internal_w) + ((REAL(1.0) - share) * off_w);
+        const mpc_real chosen = stage->p.free * share;
+        const mpc_real forced = stage->p.forced;
+        const mpc_real off = (stage->p.free - chosen) * stage->road.free_internal_off_w;
+        const mpc_real fuel = (chosen * dual->on.fuel_g_per_s)
+                              + (forced * dual->forced.fuel_g_per_s);
+        const mpc_real power = (chosen * dual->on.power_w) + (forced * dual->forced.power_w);
+        const mpc_real internal = (chosen * dual->on.internal_w)
+                                  + (forced * dual->forced.internal_w) + off;
         mpc_real heat = (of->per_fuel * fuel) - (of->per_power * power);
         mpc_real spent = of->charge_per_w * internal;
 #if MPC_STARTS
-        const mpc_real starts = real_max(stage->road.rises * (share - before), REAL(0.0));
+        const mpc_real starts = real_max(stage->p.rises * (share - before), REAL(0.0));
         heat += of->start_k * starts;
         spent += mpc_par.cranking_soc * starts;
         cost += mpc_par.start_fuel_g * starts;
@@ -69,6 +72,7 @@ static mpc_real follow(mpc_state *state, mpc_real soc_price)
         cost += (of->fuel_cost * fuel) + (stage->p.price_t * t_cl_k);
         cost += mpc_par.slack_g_per_k * beyond_k;
         cost += soc_price * real_max(of->soc_low - soc, REAL(0.0));
+        stage->x[MPC_VAR_ON] = chosen + forced;
         stage->x[MPC_VAR_SOC] = soc;
         stage->x[MPC_VAR_T_CL] = t_cl_k;
         stage->x[MPC_VAR_P_ENG] = power;
@@ -95,7 +99,7 @@ void mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p_eng
     for (int32_t k = 0; k < MPC_SHORT; k++) {
         const mpc_costate_dual *const dual = &state->stage[k].dual[state->search.here];
         on_share[k] = dual->share;
-        p_eng_w[k] = dual->share * dual->power_w;
+        p_eng_w[k] = dual->share * dual->on.power_w;
     }
 }
 

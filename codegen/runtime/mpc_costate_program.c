@@ -3,7 +3,6 @@
 #include "mpc_costate_parts.h"
 #include "mpc_costate_values.h"
 #include "mpc_model.h"
-#include "mpc_must_run.h"
 #include "mpc_real.h"
 
 #if MPC_STARTS
@@ -17,6 +16,9 @@
 void mpc_costate_program_fill(mpc_state *state)
 {
     mpc_stage_sums sums = {REAL(0.0)};
+#if MPC_STARTS
+    mpc_real free_before = REAL(1.0);
+#endif
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         mpc_costate_program *const p = &state->stage[k].p;
         const mpc_stage_road *const road = &state->stage[k].road;
@@ -28,15 +30,22 @@ void mpc_costate_program_fill(mpc_state *state)
         p->per_end = REAL(1.0) / p->of.t_end;
         p->decay = real_max(-p->of.t_before * p->per_end, LEAST_DECAY);
         p->per_decay = REAL(1.0) / p->decay;
+        p->must = REAL(1.0) - above(REAL(1.0), road->must_share);
+        p->cannot = (REAL(1.0) - p->must) * above(mpc_par.engine_min_w, p->of.free_room_w);
+        p->forced = (REAL(1.0) - p->must) * road->must_share;
+        p->free = REAL(1.0) - p->forced;
+#if MPC_STARTS
+        p->rises = road->rises * p->free * free_before;
+        free_before = p->free;
+#endif
         const mpc_real per_s = pick((road->duration_s > REAL(1.0)) ? 1 : 0, LONGER, SECOND);
-        p->width = real_max(per_s * road->duration_s, LEAST_SWITCH_G);
+        p->width = real_max(per_s * road->duration_s * p->free, LEAST_SWITCH_G);
         const mpc_real background = BACKGROUND / p->width;
-        const mpc_real takes = p->of.charge_per_w * mpc_par.moderate_w;
-        const mpc_real warms = (p->of.per_fuel * mpc_par.moderate_g_per_s)
-                               - (p->of.per_power * mpc_par.moderate_w);
+        const mpc_real takes = p->free * p->of.charge_per_w * mpc_par.moderate_w;
+        const mpc_real warms = p->free
+                               * ((p->of.per_fuel * mpc_par.moderate_g_per_s)
+                                  - (p->of.per_power * mpc_par.moderate_w));
         p->least_of_charge = background * takes * takes;
         p->least_of_heat = background * warms * warms;
-        p->must = (mpc_real)must_run(road->net_w, road->speed_mps);
-        p->cannot = (REAL(1.0) - p->must) * above(mpc_par.engine_min_w, p->of.room_w);
     }
 }

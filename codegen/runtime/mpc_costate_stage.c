@@ -63,11 +63,11 @@ static mpc_real given_by(mpc_real ratio, mpc_real w_internal)
 }
 
 /* With the convex envelope of f: the one piece that the least lies on is found by bisection. */
-mpc_least mpc_costate_least_shared(const mpc_stage *stage, const mpc_prices *price)
+mpc_least mpc_costate_least_shared(const mpc_asked *asked, const mpc_prices *price)
 {
-    const mpc_real net_w = stage->road.net_w;
-    const mpc_real low_w = stage->p.of.low_w;
-    const mpc_real high_w = stage->p.of.high_w;
+    const mpc_real net_w = asked->net_w;
+    const mpc_real low_w = asked->low_w;
+    const mpc_real high_w = asked->high_w;
     const mpc_real w_internal = real_max(price->internal, LEAST_PRICE);
     const mpc_real per = REAL(1.0) / w_internal;
     int32_t piece = 0; /* as far as is known, the least lies on it or further on */
@@ -91,20 +91,20 @@ mpc_least mpc_costate_least_shared(const mpc_stage *stage, const mpc_prices *pri
     const mpc_real internal = internal_w(net_w - power_w);
     const mpc_real cost = (price->fuel * fuel) + (price->power * power_w)
                           + (price->internal * internal);
-    const mpc_least found = {power_w, fuel, internal, cost, slope, own.ratio, inside * given};
+    const mpc_least found = {{power_w, fuel, internal}, cost, slope, own.ratio, inside * given};
     return found;
 }
 
 /* With f by its chords, of any shape: all pieces are compared. */
-mpc_least mpc_costate_least_exact(const mpc_stage *stage, const mpc_prices *price)
+mpc_least mpc_costate_least_exact(const mpc_asked *asked, const mpc_prices *price)
 {
-    const mpc_real net_w = stage->road.net_w;
+    const mpc_real net_w = asked->net_w;
     const mpc_real per = REAL(1.0) / real_max(price->internal, LEAST_PRICE);
-    mpc_least best = {REAL(0.0), REAL(0.0), REAL(0.0), NEVER_G, REAL(0.0), REAL(1.0), REAL(0.0)};
+    mpc_least best = {{REAL(0.0), REAL(0.0), REAL(0.0)}, NEVER_G, REAL(0.0), REAL(1.0), REAL(0.0)};
     for (int32_t i = 0; i < MPC_LINE_PIECES; i++) {
         const mpc_real slope = mpc_par.line_slope[i];
-        const mpc_real begin = real_max(mpc_par.line_begin_w[i], stage->p.of.low_w);
-        const mpc_real end = real_min(mpc_par.line_end_w[i], stage->p.of.high_w);
+        const mpc_real begin = real_max(mpc_par.line_begin_w[i], asked->low_w);
+        const mpc_real end = real_min(mpc_par.line_end_w[i], asked->high_w);
         const stationary there = stationary_at(net_w, price, per, slope);
         const mpc_real power_w = real_min(real_max(there.power_w, begin), end);
         const mpc_real fuel = (slope * power_w) + mpc_par.line_intercept[i];
@@ -112,9 +112,9 @@ mpc_least mpc_costate_least_exact(const mpc_stage *stage, const mpc_prices *pric
         const mpc_real cost = (price->fuel * fuel) + (price->power * power_w)
                               + (price->internal * internal);
         const int32_t is_better = ((begin <= end) ? 1 : 0) & ((cost < best.cost) ? 1 : 0);
-        best.power_w = pick(is_better, power_w, best.power_w);
-        best.fuel_g_per_s = pick(is_better, fuel, best.fuel_g_per_s);
-        best.internal_w = pick(is_better, internal, best.internal_w);
+        best.drive.power_w = pick(is_better, power_w, best.drive.power_w);
+        best.drive.fuel_g_per_s = pick(is_better, fuel, best.drive.fuel_g_per_s);
+        best.drive.internal_w = pick(is_better, internal, best.drive.internal_w);
         best.cost = pick(is_better, cost, best.cost);
     }
     return best;

@@ -72,6 +72,7 @@ class CostatePlan:
     stages, program : that it is of
     at : multipliers of the limits
     share : sigma of the smoothed dual, shape (n,)
+    power_w : while on, where there is a choice, shape (n,)
     followed : the plan, with on or off in the seconds ahead
     bound_g : no plan of this program costs less
     x : of the plan, columns as in `Var`, shape (n, len(Var))
@@ -81,6 +82,7 @@ class CostatePlan:
     program: Program
     at: Multipliers
     share: Floats
+    power_w: Floats
     followed: Followed
     bound_g: float
     x: Floats
@@ -141,7 +143,7 @@ class MhCostate(Planner):
         short = self._horizon.short_stages
         return Plan(
             solved.share[:short],
-            solved.followed.power_w[:short],
+            solved.power_w[:short],
             iterations=self._rounds,
             arrival_s=solved.stages.arrival_s(short),
             least_w=self._ramp.least_w(solved.stages.seconds_w(short), seen.soc),
@@ -197,11 +199,12 @@ class MhCostate(Planner):
         share = found.share.copy()
         share[: layout.seconds] = choice.path.runs
         price = violation_price_g(found.at)
-        followed = follow(program, share, costs.on.power_w, layout.short, price)
+        power_w, forced_w = costs.on.power_w, costs.forced.power_w
+        followed = follow(program, share, power_w, forced_w, layout.short, price)
         x = np.zeros((len(share), len(Var)))
         x[:, Var.SOC], x[:, Var.T_CL] = followed.soc, followed.t_cl_degc
-        x[:, Var.ON], x[:, Var.START] = share, followed.starts
-        x[:, Var.P_ENG] = share * followed.power_w
-        x[:, Var.FUEL] = share * followed.fuel_g_per_s
-        x[:, Var.INTERNAL] = share * followed.internal_w + (1.0 - share) * program.off_w
-        return CostatePlan(stages, program, found.at, found.share, followed, choice.bound_g, x)
+        x[:, Var.ON], x[:, Var.START] = followed.on_share, followed.starts
+        x[:, Var.P_ENG], x[:, Var.FUEL] = followed.power_w, followed.fuel_g_per_s
+        x[:, Var.INTERNAL] = followed.internal_w
+        at, shares = found.at, found.share
+        return CostatePlan(stages, program, at, shares, power_w, followed, choice.bound_g, x)

@@ -87,6 +87,7 @@ def choose(program: Program, at: Multipliers, costs: StageCosts, layout: Layout)
         p.rises[short:],
         layout.classes,
     )
+    blocks += float(costs.forced_cost[short:].sum())
     return Choice(path, path.cost + blocks + constant_part(p, at, costs.nu))
 
 
@@ -96,14 +97,15 @@ class Followed:
 
     Attributes
     ----------
-    share, power_w, fuel_g_per_s, internal_w : sigma, and E, F, l(P0 - E) while on
+    on_share : of the whole stage, forced + free sigma
+    power_w, fuel_g_per_s, internal_w : means of E, F and internal power over the whole stage
     starts : u
     soc, t_cl_degc : at the end of each stage; what does not fit under the upper limit of SOC is
         thrown away
     cost_g : fuel as expanded, starts, slack, and SOC below its limits at `soc_price`
     """
 
-    share: Floats
+    on_share: Floats
     power_w: Floats
     fuel_g_per_s: Floats
     internal_w: Floats
@@ -119,34 +121,43 @@ def violation_price_g(at: Multipliers) -> float:
 
 
 def follow(
-    program: Program, share: Floats, power_w: Floats, short: int, soc_price: float
+    program: Program,
+    share: Floats,
+    power_w: Floats,
+    forced_power_w: Floats,
+    short: int,
+    soc_price: float,
 ) -> Followed:
     """Return where on-shares and powers lead, and what that costs.
 
     Parameters
     ----------
     program : of the second
-    share, power_w : sigma, and E while on, shape (n,)
+    share, power_w, forced_power_w : sigma, and E while on, where there is a choice and where there
+        is none, shape (n,)
     short : N, stages of a second, which do not share their time between two powers
     soc_price : of SOC below its limits, g; at least the largest multiplier of a limit
     """
-    p, power = program, power_w
-    fuel = p.shared.fuel_g_per_s(power)
-    fuel[:short] = p.curves.fuel_g_per_s(power[:short])
-    internal = p.curves.internal_w(p.net_w - power)
+    p, of_choice = program, program.free * share
+    fuel = p.shared.fuel_g_per_s(power_w)
+    fuel[:short] = p.curves.fuel_g_per_s(power_w[:short])
+    fuel = of_choice * fuel + p.forced * p.shared.fuel_g_per_s(forced_power_w)
+    power = of_choice * power_w + p.forced * forced_power_w
+    internal = of_choice * p.curves.internal_w(p.net_w - power_w)
+    internal += p.forced * p.curves.internal_w(p.forced_net_w - forced_power_w)
     rise = np.diff(share, prepend=float(p.starts_on))
     starts = np.maximum(p.rises * rise, 0.0) if p.has_start else np.zeros_like(share)
-    drawn = p.charge_per_w * (share * internal + (1.0 - share) * p.off_w)
+    internal += p.free * (1.0 - share) * p.off_w
     soc, socs = p.soc, []
-    spent = (drawn + p.cranking_soc * starts).tolist()
+    spent = (p.charge_per_w * internal + p.cranking_soc * starts).tolist()
     for k, most in enumerate(p.soc_high.tolist()):
         soc = min(soc - spent[k], most)
         socs.append(soc)
-    heat = share * (p.per_fuel * fuel - p.per_power * power) + p.start_k * starts
+    heat = p.per_fuel * fuel - p.per_power * power + p.start_k * starts
     t_cl = coolant(p, heat)
     beyond_k = np.maximum(p.t_low - t_cl, 0.0) + np.maximum(t_cl - p.t_high, 0.0)
-    cost = float((p.fuel_cost * share * fuel + p.price_t * t_cl).sum())
+    cost = float((p.fuel_cost * fuel + p.price_t * t_cl).sum())
     cost += p.start_fuel_g * float(starts.sum()) + p.slack_g_per_k * float(beyond_k.sum())
     end = np.array(socs)
     cost += soc_price * float(np.maximum(p.soc_low - end, 0.0).sum())
-    return Followed(share, power, fuel, internal, starts, end, t_cl, cost)
+    return Followed(p.forced + of_choice, power, fuel, internal, starts, end, t_cl, cost)

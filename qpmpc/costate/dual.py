@@ -72,13 +72,17 @@ class StageCosts:
     Attributes
     ----------
     nu : costate of the coolant
-    on : the stage with its engine on
+    on : the stage with its engine on, in the seconds with a choice
+    forced : in the others, where a longer stage has both
+    forced_cost : of these, g
     on_cost, off_cost : of the whole stage, g; infinite where it may not or must be on
     start_cost : of one start, g
     """
 
     nu: Floats
     on: Least
+    forced: Least
+    forced_cost: Floats
     on_cost: Floats
     off_cost: Floats
     start_cost: Floats
@@ -92,6 +96,8 @@ class StageCosts:
         return StageCosts(
             self.nu,
             Least(*map(joined, exact.on, self.on)),
+            self.forced,
+            self.forced_cost,
             joined(exact.on_cost, self.on_cost),
             self.off_cost,
             self.start_cost,
@@ -104,18 +110,20 @@ class StageCosts:
         nu = coolant_costate(p, at.heat)
         price_internal = at.charge * p.charge_per_w
         minimised = least_convex if curves is p.shared else least
-        on = minimised(
-            curves,
-            p.net_w,
-            p.low_w,
-            p.high_w,
-            p.fuel_cost - nu * p.per_fuel,
-            nu * p.per_power,
-            price_internal,
-        )
+        prices = p.fuel_cost - nu * p.per_fuel, nu * p.per_power, price_internal
+        on = minimised(curves, p.net_w, p.low_w, p.high_w, *prices)
+        forced = minimised(curves, p.forced_net_w, p.forced_low_w, p.forced_high_w, *prices)
         start = p.start_fuel_g + at.charge * p.cranking_soc - nu * p.start_k
-        off = price_internal * p.off_w
-        return cls(nu, on, np.where(p.can, on.cost, np.inf), np.where(p.must, np.inf, off), start)
+        off = p.free * price_internal * p.off_w
+        return cls(
+            nu,
+            on,
+            forced,
+            p.forced * forced.cost,
+            np.where(p.can, p.free * on.cost, np.inf),
+            np.where(p.must, np.inf, off),
+            start,
+        )
 
 
 @dataclass(frozen=True)
@@ -134,7 +142,6 @@ class Dual:
     change, heat : of SOC and of the coolant row by each stage, starts included
     charge_curvature, cross_curvature, heat_curvature : derivatives of `change` with respect to
         lambda, of `change` to nu, of `heat` to nu
-    switch_charge, switch_heat : `change` and `heat` of on less those of off
     width : W
     """
 
@@ -148,8 +155,6 @@ class Dual:
     charge_curvature: Floats
     cross_curvature: Floats
     heat_curvature: Floats
-    switch_charge: Floats
-    switch_heat: Floats
     width: Floats
 
 
@@ -168,15 +173,16 @@ def dual(program: Program, at: Multipliers) -> Dual:
 
     In each stage sigma J_on + (1 - sigma) J_off + W / 2 (sigma^2 - sigma) is minimised over sigma
     in [0, 1], with W the cost over which the switch is smoothed: no more than the stage's own
-    least, and at most W / 8 below it. Starts couple the stages of a chain by prices e_k of
-    sigma_k - sigma_k-1 between 0 and rises_k times the cost of a start; that is a funnel too.
+    least, and at most W / 8 below it; what the seconds without a choice cost is beside it. Starts
+    couple the stages of a chain by prices e_k of sigma_k - sigma_k-1 between 0 and rises_k times
+    the cost of a start; that is a funnel too.
     """
     p, costs = program, StageCosts.of(program, at, program.shared)
     second, longer = SWITCH_G_PER_S, LONG_SWITCH_G_PER_S
     if p.has_start:
         second, longer = START_SWITCH_G_PER_S, START_LONG_SWITCH_G_PER_S
     width = np.where(p.duration_s > 1.0, longer, second) * p.duration_s
-    width = np.maximum(width, LEAST_SWITCH_G)
+    width = np.maximum(width * p.free, LEAST_SWITCH_G)
     free = p.can & ~p.must
     difference = np.where(free, costs.on_cost, 0.0) - np.where(free, costs.off_cost, 0.0)
     starts_g, starts = np.zeros_like(width), np.zeros_like(width)
@@ -194,31 +200,38 @@ def dual(program: Program, at: Multipliers) -> Dual:
     if p.has_start:
         rise = np.diff(share, prepend=float(p.starts_on))
         starts = np.maximum(p.rises * rise, 0.0)
-    on_part = np.where(share > 0.0, share * np.where(p.can, costs.on_cost, 0.0), 0.0)
-    off_part = np.where(share < 1.0, (1.0 - share) * np.where(p.must, 0.0, costs.off_cost), 0.0)
+    on_part = share * np.where(p.can, costs.on_cost, 0.0)
+    off_part = (1.0 - share) * np.where(p.must, 0.0, costs.off_cost)
     stages_g = on_part + off_part + share * starts_g + 0.5 * width * (share**2 - share)
+    stages_g += costs.forced_cost
     value = float(stages_g.sum()) + constant_part(p, at, costs.nu)
-    on = costs.on
-    v_charge = p.charge_per_w * on.ratio
-    v_heat = p.per_fuel * on.slope_g_per_j - p.per_power
-    gives = share * on.gives
-    switch_charge = p.charge_per_w * (p.off_w - on.internal_w)
-    switch_heat = p.per_fuel * on.fuel_g_per_s - p.per_power * on.power_w
+    on, forced = costs.on, costs.forced
+    parts = ((on, p.free * share * on.gives), (forced, p.forced * forced.gives))
+    of_charge, cross, of_heat = np.zeros((3, len(share)))
+    for part, gives in parts:
+        v_charge = p.charge_per_w * part.ratio
+        v_heat = p.per_fuel * part.slope_g_per_j - p.per_power
+        of_charge += gives * v_charge**2
+        cross += gives * v_charge * v_heat
+        of_heat += gives * v_heat**2
+    switch_charge = p.free * p.charge_per_w * (p.off_w - on.internal_w)
+    switch_heat = p.free * (p.per_fuel * on.fuel_g_per_s - p.per_power * on.power_w)
     turns = np.where(free & (share > 0.0) & (share < 1.0), 1.0 / width, 0.0)
-    soc, t_cl = _states(p, share, starts, switch_charge, switch_heat)
+    spent_w = p.free * p.off_w + p.forced * forced.internal_w
+    change = share * switch_charge - p.charge_per_w * spent_w - p.cranking_soc * starts
+    of_forced = p.per_fuel * forced.fuel_g_per_s - p.per_power * forced.power_w
+    heat = share * switch_heat + p.forced * of_forced + p.start_k * starts
     return Dual(
         at,
         value,
         costs,
         share,
         starts,
-        soc,
-        t_cl,
-        gives * v_charge**2 + turns * switch_charge**2,
-        gives * v_charge * v_heat + turns * switch_charge * switch_heat,
-        gives * v_heat**2 + turns * switch_heat**2,
-        switch_charge,
-        switch_heat,
+        p.soc + np.cumsum(change),
+        coolant(p, heat),
+        of_charge + turns * switch_charge**2,
+        cross + turns * switch_charge * switch_heat,
+        of_heat + turns * switch_heat**2,
         width,
     )
 
@@ -242,15 +255,6 @@ def _start_prices(
         edge = min(max(edge + known + more, at_least), at_most)
         edges.append(edge)
     return np.array(edges[:-1])
-
-
-def _states(
-    program: Program, share: Floats, starts: Floats, switch_charge: Floats, switch_heat: Floats
-) -> tuple[Floats, Floats]:
-    p = program
-    change = share * switch_charge - p.charge_per_w * p.off_w - p.cranking_soc * starts
-    heat = share * switch_heat + p.start_k * starts
-    return p.soc + np.cumsum(change), coolant(p, heat)
 
 
 def coolant(program: Program, heat: Floats) -> Floats:

@@ -61,8 +61,13 @@ class QpCertificate:
         costs = shared.with_first(layout.short, StageCosts.of(p, at, p.curves))
         bound_g = choose(p, at, costs, layout).bound_g
         on = np.clip(x[:, Var.ON], 0.0, 1.0)
-        power = np.clip(x[:, Var.P_ENG] / np.maximum(on, LEAST_SHARE), p.low_w, p.high_w)
-        share = on.copy()
+        share = np.clip((on - p.forced) / p.free, 0.0, 1.0)
         share[: layout.short] = on[: layout.short] >= RUNS
         share = np.where(p.must, 1.0, np.where(p.can, share, 0.0))
-        return follow(p, share, power, layout.short, violation_price_g(at)).cost_g - bound_g
+        # the battery gives as much in the seconds without a choice as in the others
+        runs, more_w = np.maximum(on, LEAST_SHARE), p.forced_net_w - p.net_w
+        power_w = (x[:, Var.P_ENG] - p.forced * more_w) / runs
+        forced_w = np.clip(power_w + more_w, p.forced_low_w, p.forced_high_w)
+        power_w = np.clip(power_w, p.low_w, p.high_w)
+        price = violation_price_g(at)
+        return follow(p, share, power_w, forced_w, layout.short, price).cost_g - bound_g

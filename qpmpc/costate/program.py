@@ -16,21 +16,24 @@ from qpmpc.qp.quantities import Quantities
 from qpmpc.qp.scaling import ScalingSettings
 from qpmpc.qp.settings import LimitSettings, QpSettings
 from qpmpc.qp.stage_qp import qp_parameters
-from qpmpc.vehicle.must_run import must_run
 from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
 
 # Numbers of a stage from those of the QP's table, in numpy and in C; see `Program`.
-TAKEN = ["growing", "room_w", "per_fuel", "per_power", "soc_low", "soc_high"]
+TAKEN = ["growing", "per_fuel", "per_power", "soc_low", "soc_high"]
 PROGRAM = """
 fuel_cost = duration_s * alpha
 charge_per_w = duration_s / battery_energy_j
 t_end = 1.0 + per_end
 t_before = per_end - per_start
 settled = settled_k
-low_w = max(engine_min_w, min(missing_w, engine_max_w))
-high_w = max(min(engine_max_w, room_w), low_w)
+free_room_w = free_net_w + battery_charge_max_w
+low_w = max(engine_min_w, min(free_net_w - battery_discharge_max_w, engine_max_w))
+high_w = max(min(engine_max_w, free_room_w), low_w)
+forced_net_w = (net_w - (1.0 - must_share) * free_net_w) / max(must_share, LEAST_FORCED)
+forced_low_w = max(engine_min_w, min(forced_net_w - battery_discharge_max_w, engine_max_w))
+forced_high_w = max(min(engine_max_w, forced_net_w + battery_charge_max_w), forced_low_w)
 t_low = floor_degc - origin_t_cl_degc
 t_high = t_max_degc - origin_t_cl_degc
 start_k = per_power * lhv_j_per_g * start_fuel_g / max(duration_s, SHORTEST_SCALE_S)
@@ -50,7 +53,10 @@ class Program:
         SOC_k = SOC_k-1 - h / E_bat [sigma l(P0 - E) + (1 - sigma) l_off] - cranking_soc u_k
         t_end T_k + t_before T_k-1 = settled + per_fuel sigma F - per_power sigma E + per_start u_k
 
-    and the limits. Attributes are the numbers of `qpmpc.qp.rows`, plus
+    and the limits. Where the engine must run in a share m of the seconds of a longer stage, these
+    have a power E_m of their own, at their own P0; sigma, E, P0 and l_off are of the others:
+    m E_m + (1 - m) sigma E takes the place of sigma E, likewise F and l. Attributes are the numbers
+    of `qpmpc.qp.rows`, plus
 
     Attributes
     ----------
@@ -60,10 +66,15 @@ class Program:
     charge_per_w : SOC that a watt out of the store takes in each stage, h / E_bat
     price_t : cost of a kelvin at the end of each stage, of its own and of the next one's `growing`
     low_w, high_w : limits of E
-    must, can : whether the engine has to run, and whether it may
+    net_w, off_w : P0 and l(P0) of the seconds with a choice; of all where there is none
+    must, can : whether the engine has to run in all seconds, and whether it may in those with a
+        choice
+    forced, forced_net_w, forced_low_w, forced_high_w : m where it is between 0 and 1, else 0; of
+        these seconds
+    free : 1 - forced
     start_k : heat of a start, K
     starts_on : engine state now
-    rises : see `Stages`
+    rises : see `Stages`; of sigma, and so fewer by the share without a choice
     soc, t_cl_degc : state now, scalars
     """
 
@@ -84,7 +95,12 @@ class Program:
     price_t: Floats
     low_w: Floats
     high_w: Floats
+    forced_net_w: Floats
+    forced_low_w: Floats
+    forced_high_w: Floats
     must: NDArray[np.bool_]
+    forced: Floats
+    free: Floats
     can: NDArray[np.bool_]
     soc_low: Floats
     soc_high: Floats
@@ -150,8 +166,11 @@ class ProgramBuilder:
             return np.array(np.broadcast_to(of_stage, (count, 1))[:, 0])
 
         of = {name: value(name) for name in (*TAKEN, *MADE)}
-        growing, room_w = of.pop("growing"), of.pop("room_w")
-        must = must_run(self._vehicle, stages.net_w, stages.speed_mps)
+        growing, room_w = of.pop("growing"), of.pop("free_room_w")
+        must = stages.must_share >= 1.0
+        forced = np.where(must, 0.0, stages.must_share)
+        rises = stages.rises * (1.0 - forced)
+        rises[1:] *= 1.0 - forced[:-1]
         price_t = growing.copy()
         price_t[:-1] += growing[1:]
         return Program(
@@ -160,16 +179,18 @@ class ProgramBuilder:
             short=self._layout.short_stages,
             classes=self._layout.classes,
             duration_s=stages.duration_s,
-            net_w=stages.net_w,
-            off_w=stages.internal_off_w,
+            net_w=stages.free_net_w,
+            off_w=stages.free_internal_off_w,
             price_t=price_t,
             must=must,
+            forced=forced,
+            free=1.0 - forced,
             can=must | (room_w >= number["engine_min_w"]),
             slack_g_per_k=number["slack_g_per_k"],
             start_fuel_g=number["start_fuel_g"],
             cranking_soc=number["cranking_j"] / number["battery_energy_j"],
             starts_on=engine_on,
-            rises=stages.rises,
+            rises=rises,
             soc=soc,
             t_cl_degc=t_cl_degc,
             **of,

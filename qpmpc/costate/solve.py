@@ -75,8 +75,8 @@ def aim(program: Program, here: Dual, most_charge: float) -> Multipliers:
     # of a stage that does not respond now: of switching an engine at a moderate power
     moderate_w, fuel = moderate(p.curves)
     background = BACKGROUND / here.width
-    of_charge = here.charge_curvature + background * (p.charge_per_w * moderate_w) ** 2
-    warms = p.per_fuel * fuel - p.per_power * moderate_w
+    of_charge = here.charge_curvature + background * (p.free * p.charge_per_w * moderate_w) ** 2
+    warms = p.free * (p.per_fuel * fuel - p.per_power * moderate_w)
     of_heat = here.heat_curvature + background * warms**2
     # SOC is limited in each second and at the end of each block, so a block is one term
     first = np.append(np.arange(p.short), np.arange(p.short, len(of_charge), p.classes))

@@ -24,6 +24,7 @@ from qpmpc.qp.expressions import FormulaError, expression, terms_of
 from qpmpc.vehicle.engine_parameters import Engine
 
 SHORTEST_SCALE_S = 1.0  # a masked stage is scaled as one of 1 s
+LEAST_FORCED = 1e-6  # share of the seconds without a choice: of a stage that has none
 COOL_SHARE = 0.5  # of the SOC reserve, where the thermostat is closed
 MOOT_G_PER_S = 5.0  # a bound on fuel that is never met
 SIGMA_FORCED = 0.99  # "engine must be on" as a lower bound on sigma, kept apart from the upper one
