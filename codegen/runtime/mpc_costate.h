@@ -47,7 +47,7 @@ typedef struct {
     mpc_real share;   /* sigma */
     mpc_drive on;     /* while on, where there is a choice */
     mpc_drive forced; /* where there is none, in a stage that has both */
-    mpc_real on_g;    /* cost of the whole stage on, off, and of a start */
+    mpc_real on_g;    /* cost of the seconds with a choice on, off, and of a start */
     mpc_real off_g;
     mpc_real forced_g; /* what the seconds without a choice add */
 #if MPC_STARTS

@@ -75,7 +75,7 @@ class StageCosts:
     on : the stage with its engine on, in the seconds with a choice
     forced : in the others, where a longer stage has both
     forced_cost : of these, g
-    on_cost, off_cost : of the whole stage, g; infinite where it may not or must be on
+    on_cost, off_cost : of all seconds with a choice, g; infinite where it may not or must be on
     start_cost : of one start, g
     """
 

@@ -140,7 +140,7 @@ class ProgramBuilder:
         limits: LimitSettings,
         layout: HorizonSettings,
     ) -> None:
-        self._vehicle, self._layout = vehicle, layout
+        self._layout = layout
         settings = QpSettings(**limits.model_dump(include=set(LimitSettings.model_fields)))
         self._parameters = qp_parameters(vehicle, model, settings, ScalingSettings())
         self._quantities = Quantities(self._parameters, vehicle, model, stages)

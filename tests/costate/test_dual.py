@@ -74,7 +74,7 @@ def test_newton_finds_its_top(car, step, soc, t_cl, on):
         return found
 
     # 60 rounds do but where the same switch has to keep the coolant and the SOC at the end, one at
-    # a time: 17 of 1,800 states, most of them drawn on that edge
+    # a time: 11 of 1,800 states, most of them drawn on that edge
     few = top(60.0, 60), top(300.0, 60)
     if few[0] != pytest.approx(few[1], abs=0.02):
         assert top(60.0, 1000) == pytest.approx(top(300.0, 1000), abs=0.02)
