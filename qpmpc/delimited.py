@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
+from unicodedata import normalize
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,8 @@ class Column:
     Attributes
     ----------
     title : as written in the header
-    name : the title without its unit, in lower case, `_` for all but letters and digits
+    name : the title without its unit, in lower case, without accents, `_` for all but letters and
+        digits
     unit : in brackets or after a comma in the title, or from a row of units, in lower case without
         spaces; empty where neither is
     cells : of each row, without spaces around
@@ -210,7 +212,8 @@ def split_title(title: str) -> tuple[str, str]:
     """Return `Column.name` and the unit in brackets or after a comma, empty where there is none."""
     found = next((match for form in _UNIT_IN_TITLE if (match := form.match(title))), None)
     name, unit = (found["name"], found["unit"]) if found else (title, "")
-    return re.sub(r"[^0-9a-z%/]+", "_", name.lower()).strip("_"), plain_unit(unit)
+    bare = re.sub("[\u0300-\u036f]", "", normalize("NFD", name.casefold()))
+    return re.sub(r"[^0-9a-z%/]+", "_", bare).strip("_"), plain_unit(unit)
 
 
 def plain_unit(unit: str) -> str:

@@ -1,4 +1,7 @@
-"""Names and units that time, speed, grade and elevation have in logs."""
+"""Names and units that time, speed, grade and elevation have in logs.
+
+Names are English, German, French and Spanish, without accents, as `qpmpc.delimited` leaves them.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -37,8 +40,14 @@ TIME = Quantity(
     (
         "time", "t", "test_time", "elapsed_time", "timestamp", "cycsecs", "device_time",
         "gps_time", "datetime", "date_time", "unix_time", "epoch",
+        "zeit", "messzeit", "zeitstempel", "uhrzeit",
+        "temps", "temps_ecoule", "horodatage", "heure",
+        "tiempo", "tiempo_transcurrido", "fecha_hora", "fecha_y_hora", "hora",
     ),
-    {"s": 1.0, "sec": 1.0, "secs": 1.0, "seconds": 1.0, "ms": 1e-3, "min": 60.0},
+    {
+        "s": 1.0, "sec": 1.0, "secs": 1.0, "seconds": 1.0, "ms": 1e-3, "min": 60.0,
+        "sek": 1.0, "sekunden": 1.0, "secondes": 1.0, "seg": 1.0, "segundos": 1.0,
+    },
     {"cycsecs": 1.0},
 )  # fmt: skip
 SPEED = Quantity(
@@ -46,6 +55,11 @@ SPEED = Quantity(
     (
         "speed", "v", "velocity", "vehicle_speed", "target_speed", "speed_obd", "gps_speed",
         "speed_gps", "cycmps", "vehiclespeed", "vehspd", "vehspeed", "veh_spd", "v_veh",
+        "geschwindigkeit", "fahrzeuggeschwindigkeit", "fahrgeschwindigkeit", "geschwindigkeit_obd",
+        "gps_geschwindigkeit", "geschwindigkeit_gps", "v_fzg", "vfzg",
+        "vitesse", "vitesse_vehicule", "vitesse_du_vehicule", "vitesse_obd", "vitesse_gps",
+        "velocidad", "velocidad_vehiculo", "velocidad_del_vehiculo", "velocidad_obd",
+        "velocidad_gps", "gps_velocidad",
     ),
     {
         "m/s": 1.0, "mps": 1.0, "m/sec": 1.0, "meters/second": 1.0, "meters_per_second": 1.0,
@@ -56,16 +70,20 @@ SPEED = Quantity(
 )  # fmt: skip
 GRADE = Quantity(
     "grade",
-    ("grade", "road_grade", "gradient", "slope", "cycgrade"),
+    ("grade", "road_grade", "gradient", "slope", "cycgrade", "steigung",
+     "fahrbahnsteigung", "strassensteigung", "pente", "pendiente"),
     {"m/m": 1.0, "-": 1.0, "1": 1.0, "%": 1e-2, "percent": 1e-2, "pct": 1e-2},
     {"grade": 1.0, "cycgrade": 1.0},  # ours, and FASTSim's
-)
+)  # fmt: skip
 ELEVATION = Quantity(
     "elevation",
     (
         "elevation", "altitude", "ele", "alt", "gps_altitude", "altitude_gps", "gps_alt", "alt_gps",
         "gps_elevation", "elevation_gps", "gps_ele", "ele_gps",
-        "elevation_smoothed", "elevation_raw",
+        "elevation_smoothed", "elevation_raw", "height", "gps_height",
+        "hohe", "hoehe", "meereshohe", "gps_hohe", "gps_hoehe", "hohe_gps", "hoehe_gps",
+        "hohe_uber_nn", "hoehe_ueber_nn",
+        "altitud", "altitud_gps", "gps_altitud", "elevacion",
     ),
     {"m": 1.0, "meters": 1.0, "ft": 0.3048, "feet": 0.3048},
 )  # fmt: skip

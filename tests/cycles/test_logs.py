@@ -52,6 +52,16 @@ FILES = {
     ),
     "vehicle energy data": "DayNum,VehId,Trip,Timestamp(ms),Vehicle Speed[km/h],OAT[DegC]\n"
     + rows(lambda k, v: f"1.5,8,706,{1000 * k},{v * 3.6!r},NaN"),
+    "German, decimal commas": "Messung 4\nZeit [s];Fahrzeuggeschwindigkeit [km/h];Höhe über NN\n"
+    + rows(lambda k, v: f"{k},0;{v * 3.6!r};212,5".replace(".", ",")),
+    "a German app": "Device Time,Geschwindigkeit (OBD)(km/h),GPS Höhe(m)\n"
+    + rows(lambda k, v: f"{BEGIN + timedelta(seconds=k):%d-%b-%Y %H:%M:%S}.120,{v * 3.6!r},212"),
+    "German, a row of units": "Zeitstempel;Geschwindigkeit;Steigung\nms;m/s;%\n"
+    + rows(lambda k, v: f"{1000 * k};{v!r};0".replace(".", ",")),
+    "French": "Temps écoulé (s);Vitesse du véhicule (km/h);Pente (%);Altitude (m)\n"
+    + rows(lambda k, v: f"{k};{v * 3.6!r};0;212".replace(".", ",")),
+    "Spanish": "Tiempo (seg),Velocidad (km/h),Pendiente (%),Altitud (m)\n"
+    + rows(lambda k, v: f"{k},{v * 3.6!r},0,212"),
     "10 Hz": "time_s;speed_mps\n"
     + "".join(f"{k / 10};{float(np.interp(k / 10, range(17), SPEED_MPS))!r}\n" for k in range(161)),
     "noise while standing": "time_s,speed_mps\n"
@@ -85,6 +95,25 @@ def test_what_was_assumed_is_said(tmp_path: Path) -> None:
     assert not load_cycle(path).remarks
 
 
+@pytest.mark.parametrize(
+    ("slope", "height"),
+    [
+        ("Steigung (%)", "Höhe (m)"),
+        ("Pente (%)", "Altitude (m)"),
+        ("Pendiente (%)", "Altitud (m)"),
+    ],
+)
+def test_slope_and_elevation_in_other_languages(tmp_path: Path, slope: str, height: str) -> None:
+    """A road that rises by 2 %, once by its slope, once by its elevation."""
+    path = tmp_path / "log.csv"
+    rising = "".join(f"{k};36;2,0\n" for k in range(60))
+    path.write_text(f"Zeit (s);Vitesse (km/h);{slope}\n{rising}")
+    np.testing.assert_allclose(load_cycle(path).grade, 0.02)
+    rising = "".join(f"{k};36;{0.2 * k!r}\n" for k in range(200)).replace(".", ",")
+    path.write_text(f"Zeit (s);Velocidad (km/h);{height}\n{rising}")
+    np.testing.assert_allclose(load_cycle(path).grade[80:120], 0.02, atol=1e-3)
+
+
 def test_a_stamp_that_is_there_twice_is_left_out(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     text = "time_s,speed_mps\n" + "".join(f"{k},{v}\n" for k, v in enumerate(2 * SPEED_MPS))
@@ -97,6 +126,9 @@ def test_a_stamp_that_is_there_twice_is_left_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
+        ("Zeit;Geschwindigkeit [km/h]\n0;0\n1;1\n2;2\n", "'Zeit' names no unit: add one of s, "),
+        ("Temps [s];Vitesse\n0;0\n1;1\n2;2\n", "'Vitesse' names no unit: add one of m/s, "),
+        ("Tiempo [s];Velocidad [km/s]\n0;0\n1;1\n2;2\n", "unit 'km/s', allowed: m/s"),
         ("time,speed_mps\n0,0\n1,1\n2,2\n3,3\n", "'time' names no unit: add one of s, "),
         ("time_s,speed\n0,0\n1,1\n2,2\n3,3\n4,4\n", "'speed' names no unit: add one of m/s, "),
         ("time_s,speed [furlong]\n0,0\n1,1\n2,2\n3,3\n", "unit 'furlong', allowed: m/s"),
