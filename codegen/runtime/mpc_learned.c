@@ -1,4 +1,4 @@
-/* Level and tilt of the fuel map by least squares, forgetful and bounded, from the fuel injected.
+/* Level and tilt of the fuel map by least squares, forgetful and bounded, from the fuel measured.
  *
  * The same in Python, with the formulas: qpmpc/pwa/learned_fuel.py.
  */
@@ -8,29 +8,112 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
+/* Weight of the map in the equation of an unknown: level, tilt, and what is measured late. */
+static const mpc_real weight[MPC_UNKNOWNS] = {PRIOR, PRIOR, PRIOR_LATE, PRIOR_LATE, PRIOR_LATE};
+
+static int32_t is_count(int32_t x, int32_t most) { return ((x >= 0) && (x <= most)) ? 1 : 0; }
+
 /* Place of a power between -1, idling, and 1, full power. */
 static mpc_real place(mpc_real p_eng_w)
 {
     return ((REAL(2.0) * p_eng_w) / mpc_par.engine_max_w) - REAL(1.0);
 }
 
-/* The greatest power also stands for one that is not known, and teaches nothing. */
+/* Level, tilt and what is late as they are now, by elimination from the last. No pivot is less than
+ * the map's weight, but by rounding. */
+static void solve(const mpc_learned *of, mpc_real x[MPC_UNKNOWNS])
+{
+    mpc_real a[MPC_UNKNOWNS][MPC_UNKNOWNS];
+    for (int32_t i = 0; i < MPC_UNKNOWNS; i++) {
+        for (int32_t j = 0; j < MPC_UNKNOWNS; j++) {
+            a[i][j] = of->square[i][j];
+        }
+        a[i][i] += weight[i];
+        x[i] = of->product[i];
+    }
+    x[0] += weight[0];
+    for (int32_t k = MPC_UNKNOWNS - 1; k >= 0; k--) {
+        a[k][k] = real_max(a[k][k], weight[k]);
+        for (int32_t i = 0; i < k; i++) {
+            const mpc_real factor = a[i][k] / a[k][k];
+            for (int32_t j = 0; j < k; j++) {
+                a[i][j] -= factor * a[k][j];
+            }
+            x[i] -= factor * x[k];
+        }
+    }
+    for (int32_t k = 0; k < MPC_UNKNOWNS; k++) {
+        for (int32_t j = 0; j < k; j++) {
+            x[k] -= a[k][j] * x[j];
+        }
+        x[k] /= a[k][k];
+    }
+}
+
+/* Learn from a second in which so much was measured, as a share of the fuel at full power. */
+static void learn(mpc_learned *of, mpc_real measured, mpc_real start)
+{
+    mpc_real found[MPC_UNKNOWNS];
+    mpc_real x[MPC_UNKNOWNS];
+    solve(of, found);
+    x[0] = of->fuel[0] - start;
+    x[1] = of->tilted[0];
+    for (int32_t j = 1; j <= MPC_LATE; j++) {
+        const mpc_real late = real_clip(found[1 + j], REAL(0.0), REAL(1.0));
+        x[1] += late * (of->tilted[j] - of->tilted[j - 1]);
+        x[1 + j] = of->fuel[j] - of->fuel[j - 1];
+    }
+    for (int32_t i = 0; i < MPC_UNKNOWNS; i++) {
+        for (int32_t j = 0; j < MPC_UNKNOWNS; j++) {
+            of->square[i][j] = (KEPT * of->square[i][j]) + (x[i] * x[j]);
+        }
+        of->product[i] = (KEPT * of->product[i]) + ((measured - start) * x[i]);
+    }
+}
+
+/* Put a second in front of those before, or forget them all. */
+static void remember(mpc_learned *of, mpc_real fuel, mpc_real tilted, int32_t is_over)
+{
+    for (int32_t j = MPC_LATE; j > 0; j--) {
+        of->fuel[j] = (is_over != 0) ? REAL(0.0) : of->fuel[j - 1];
+        of->tilted[j] = (is_over != 0) ? REAL(0.0) : of->tilted[j - 1];
+    }
+    of->fuel[0] = fuel;
+    of->tilted[0] = tilted;
+}
+
+/* Full power also stands for one that is not known, and teaches nothing while its fuel may come. */
 void mpc_learned_take(mpc_state *state)
 {
     const mpc_measured *const good = &state->watch.good;
     mpc_learned *const of = &state->learned;
-    const mpc_real p_eng_w = good->p_eng_before_w;
-    if ((good->engine_on != 0) && (p_eng_w < mpc_par.engine_max_w)) {
-        const mpc_real start_g = (good->engine_for_s == 1) ? mpc_par.start_fuel_g : REAL(0.0);
+    const int32_t is_on = (good->engine_on != 0) ? 1 : 0;
+    if ((is_on != 0) || (of->left_s > 0)) {
+        const mpc_real p_eng_w = good->p_eng_before_w;
+        const mpc_real rated_g = mpc_par.learned_map_g_per_s[MPC_FUEL_PIECES];
         const mpc_real map_g = mpc_map_cold_factor(good->t_cl_degc) * mpc_map_fuel_g_per_s(p_eng_w);
-        const mpc_real ratio = (good->fuel_g - start_g) / map_g;
-        if (within(ratio, RATIO_LEAST, RATIO_MOST) != 0) {
-            const mpc_real p = place(p_eng_w);
-            of->one = (KEPT * of->one) + REAL(1.0);
-            of->p = (KEPT * of->p) + p;
-            of->pp = (KEPT * of->pp) + (p * p);
-            of->r = (KEPT * of->r) + ratio;
-            of->rp = (KEPT * of->rp) + (ratio * p);
+        const mpc_real share = (is_on != 0) ? (map_g / rated_g) : REAL(0.0);
+        const int32_t is_start = ((is_on != 0) && (good->engine_for_s == 1)) ? 1 : 0;
+        const mpc_real start = (is_start != 0) ? (mpc_par.start_fuel_g / rated_g) : REAL(0.0);
+        of->left_s = (is_on != 0) ? MPC_LATE : (of->left_s - 1);
+        if ((is_on != 0) && (p_eng_w >= mpc_par.engine_max_w)) {
+            of->void_s = MPC_LATE + 1;
+        } else {
+            of->void_s = (of->void_s > 0) ? (of->void_s - 1) : 0;
+        }
+        remember(of, share + start, share * place(p_eng_w), 0);
+        mpc_real least = of->fuel[0];
+        mpc_real most = of->fuel[0];
+        for (int32_t j = 1; j <= MPC_LATE; j++) {
+            least = real_min(least, of->fuel[j]);
+            most = real_max(most, of->fuel[j]);
+        }
+        const mpc_real measured = good->fuel_g / rated_g; /* below 0 if it is not known */
+        if ((of->void_s == 0) && (within(measured, RATIO_LEAST * least, RATIO_MOST * most) != 0)) {
+            learn(of, measured, start);
+        }
+        if (of->left_s == 0) {
+            remember(of, REAL(0.0), REAL(0.0), 1);
         }
     }
 }
@@ -44,13 +127,10 @@ static mpc_real chord(const mpc_real *fuel, int32_t i, int32_t j)
 void mpc_learned_curve(mpc_state *state)
 {
     mpc_learned *const of = &state->learned;
-    const mpc_real a = of->one + PRIOR_S;
-    const mpc_real c = of->pp + PRIOR_S;
-    const mpc_real r = of->r + PRIOR_S;
-    const mpc_real divisor = real_max((a * c) - (of->p * of->p), PRIOR_S * PRIOR_S);
-    const mpc_real level = real_clip(((c * r) - (of->p * of->rp)) / divisor, REAL(1.0) - LEVEL_MOST,
-                                     REAL(1.0) + LEVEL_MOST);
-    const mpc_real tilt = real_clip(((a * of->rp) - (of->p * r)) / divisor, -TILT_MOST, TILT_MOST);
+    mpc_real found[MPC_UNKNOWNS];
+    solve(of, found);
+    const mpc_real level = real_clip(found[0], REAL(1.0) - LEVEL_MOST, REAL(1.0) + LEVEL_MOST);
+    const mpc_real tilt = real_clip(found[1], -TILT_MOST, TILT_MOST);
     mpc_real fuel[MPC_FUEL_PIECES + 1];
     for (int32_t k = 0; k <= MPC_FUEL_PIECES; k++) {
         const mpc_real factor = level + (tilt * place(mpc_par.learned_power_w[k]));
@@ -78,7 +158,16 @@ void mpc_learned_curve(mpc_state *state)
 int32_t mpc_learned_check(const mpc_state *state)
 {
     const mpc_learned *const of = &state->learned;
-    return within(of->one, REAL(0.0), SUM_MOST) & within(of->p, -SUM_MOST, SUM_MOST)
-           & within(of->pp, REAL(0.0), SUM_MOST) & within(of->r, REAL(0.0), SUM_MOST)
-           & within(of->rp, -SUM_MOST, SUM_MOST);
+    int32_t fine = is_count(of->left_s, MPC_LATE) & is_count(of->void_s, MPC_LATE + 1);
+    for (int32_t j = 0; j <= MPC_LATE; j++) {
+        fine &= within(of->fuel[j], REAL(0.0), SUM_MOST)
+                & within(of->tilted[j], -SUM_MOST, SUM_MOST);
+    }
+    for (int32_t i = 0; i < MPC_UNKNOWNS; i++) {
+        for (int32_t j = 0; j < MPC_UNKNOWNS; j++) {
+            fine &= within(of->square[i][j], -SUM_MOST, SUM_MOST);
+        }
+        fine &= within(of->product[i], -SUM_MOST, SUM_MOST);
+    }
+    return fine;
 }

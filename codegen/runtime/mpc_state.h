@@ -60,14 +60,20 @@ typedef struct {
 } mpc_measured;
 
 #if MPC_LEARNING
-/* What is known of the fuel map: sums over past seconds, see mpc_learned.c; and the curve that is
- * made of them. */
+enum {
+    MPC_LATE = 3,    /* seconds that fuel may be measured late, at most */
+    MPC_UNKNOWNS = 5 /* level, tilt, and what is late by so many seconds or more */
+};
+
+/* What is known of the fuel map, see mpc_learned.c: the last seconds, sums over all before; and the
+ * curve that is made of them. Fuel is a share of that at full power. */
 typedef struct {
-    mpc_real one;
-    mpc_real p;
-    mpc_real pp;
-    mpc_real r;
-    mpc_real rp;
+    int32_t left_s;                /* in which fuel of the engine, now off, may still be measured */
+    int32_t void_s;                /* that teach nothing */
+    mpc_real fuel[MPC_LATE + 1];   /* the map's, starts included, in the last second and before */
+    mpc_real tilted[MPC_LATE + 1]; /* the map's times the place of its power, without starts */
+    mpc_real square[MPC_UNKNOWNS][MPC_UNKNOWNS];
+    mpc_real product[MPC_UNKNOWNS];
     mpc_real slope[MPC_FUEL_PIECES];
     mpc_real intercept[MPC_FUEL_PIECES];
     mpc_real idle_g_per_s;

@@ -161,9 +161,13 @@ class QpPlanner(Planner):
     def plan(self, seen: Observation) -> Plan:
         """Spend one step's iterations on the QP of this second."""
         if self.learned_fuel is not None:
-            if seen.engine_on:
-                started = seen.engine_for_s == 1
-                self.learned_fuel.take(seen.fuel_g, seen.p_eng_before_w, seen.t_cl_degc, started)
+            self.learned_fuel.take(
+                seen.fuel_g,
+                seen.p_eng_before_w,
+                seen.t_cl_degc,
+                seen.engine_on,
+                seen.engine_on and seen.engine_for_s == 1,
+            )
             self._use(self.learned_fuel)
         solved = self.solve(seen)
         iterations = solved.solution.iterations
