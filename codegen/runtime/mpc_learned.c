@@ -8,9 +8,6 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-/* Weight of the map in the equation of an unknown: level, tilt, and what is measured late. */
-static const mpc_real weight[MPC_UNKNOWNS] = {PRIOR, PRIOR, PRIOR_LATE, PRIOR_LATE, PRIOR_LATE};
-
 static int32_t is_count(int32_t x, int32_t most) { return ((x >= 0) && (x <= most)) ? 1 : 0; }
 
 /* Place of a power between -1, idling, and 1, full power. */
@@ -19,10 +16,11 @@ static mpc_real place(mpc_real p_eng_w)
     return ((REAL(2.0) * p_eng_w) / mpc_par.engine_max_w) - REAL(1.0);
 }
 
-/* Level, tilt and what is late as they are now, by elimination from the last. No pivot is less than
- * the map's weight, but by rounding. */
+/* Level, tilt and what is late as they are now, by elimination from the last. `weight` is the map's
+ * in the equation of each; no pivot is less, but by rounding. */
 static void solve(const mpc_learned *of, mpc_real x[MPC_UNKNOWNS])
 {
+    static const mpc_real weight[MPC_UNKNOWNS] = {PRIOR, PRIOR, PRIOR_LATE, PRIOR_LATE, PRIOR_LATE};
     mpc_real a[MPC_UNKNOWNS][MPC_UNKNOWNS];
     for (int32_t i = 0; i < MPC_UNKNOWNS; i++) {
         for (int32_t j = 0; j < MPC_UNKNOWNS; j++) {
@@ -92,9 +90,12 @@ void mpc_learned_take(mpc_state *state)
         const mpc_real p_eng_w = good->p_eng_before_w;
         const mpc_real rated_g = mpc_par.learned_map_g_per_s[MPC_FUEL_PIECES];
         const mpc_real map_g = mpc_map_cold_factor(good->t_cl_degc) * mpc_map_fuel_g_per_s(p_eng_w);
-        const mpc_real share = (is_on != 0) ? (map_g / rated_g) : REAL(0.0);
-        const int32_t is_start = ((is_on != 0) && (good->engine_for_s == 1)) ? 1 : 0;
-        const mpc_real start = (is_start != 0) ? (mpc_par.start_fuel_g / rated_g) : REAL(0.0);
+        mpc_real share = REAL(0.0);
+        mpc_real start = REAL(0.0);
+        if (is_on != 0) {
+            share = map_g / rated_g;
+            start = (good->engine_for_s == 1) ? (mpc_par.start_fuel_g / rated_g) : REAL(0.0);
+        }
         of->left_s = (is_on != 0) ? MPC_LATE : (of->left_s - 1);
         if ((is_on != 0) && (p_eng_w >= mpc_par.engine_max_w)) {
             of->void_s = MPC_LATE + 1;
