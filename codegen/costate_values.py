@@ -1,5 +1,8 @@
 """The numbers of a generated costate controller, beside those that every method needs."""
 
+import numpy as np
+from numpy.typing import NDArray
+
 from qpmpc.codegen.forecast_values import fixed_block_s
 from qpmpc.codegen.shared_values import shared_values
 from qpmpc.codegen.values import CONSTANTS_OF_ALL, Values, of_modules
@@ -19,12 +22,15 @@ from qpmpc.qp.settings import QpSettings
 from qpmpc.qp.stage_qp import qp_parameters
 from qpmpc.vehicle.parameters import Vehicle
 
+Floats = NDArray[np.float64]
+
+BEYOND_ALL_W = 1e30
 MOST_STATES = 32  # of the shortest path, a bit each
 
 CONSTANTS = CONSTANTS_OF_ALL | of_modules(
     (rows, "SHORTEST_SCALE_S LEAST_FORCED COOL_SHARE"),
     (stage, "LEAST_RATIO LEAST_PRICE"),
-    (funnel, "LEAST_RESPONSE UNLIMITED"),
+    (funnel, "ENDLESS_RESPONSE LEAST_RESPONSE UNLIMITED"),
     (
         solve,
         "CHARGE_HALF_STEPS HEAT_HALF_STEPS LEAST_RISE_G BACKGROUND LEAST_DECAY AT_SLACK FIRST_SHARE"
@@ -59,6 +65,7 @@ def costate_values_of(
     shared = shared_values(vehicle, model, settings.horizon, rules, blocks, "mh_costate")
     curves = Curves.of(vehicle, model.line)
     envelope, shortest = curves.envelope(), Shortest.of(engine)
+    stride = 1 << max((len(envelope.slope) - 1).bit_length() - 1, 0)
     most_states = settings.horizon.short_stages + 1
     run, rest = min(shortest.on_s, most_states), min(shortest.off_s, most_states)
     if max(run, rest) > MOST_STATES:
@@ -75,8 +82,8 @@ def costate_values_of(
         **shared.scalars,
         "quarter_discharge_w": square_v2 / (4.0 * curves.discharge_ohm),
         "quarter_charge_w": square_v2 / (4.0 * curves.charge_ohm),
-        "per_quarter_discharge_w": 4.0 * curves.discharge_ohm / square_v2,
-        "per_quarter_charge_w": 4.0 * curves.charge_ohm / square_v2,
+        "per_quarter_mean": 2.0 * (curves.discharge_ohm + curves.charge_ohm) / square_v2,
+        "per_quarter_half": 2.0 * (curves.discharge_ohm - curves.charge_ohm) / square_v2,
         "moderate_w": moderate_w,
         "moderate_g_per_s": moderate_g_per_s,
         "cold_charge_g": mh_costate.COLD_CHARGE * unit_g(model),
@@ -86,10 +93,10 @@ def costate_values_of(
     arrays = {
         **shared.arrays,
         **{
-            f"{name}_{part}": getattr(of, part)
-            for name, of in (("shared", envelope), ("line", curves))
+            f"line_{part}": getattr(curves, part)
             for part in ("begin_w", "end_w", "slope", "intercept")
         },
+        "shared": _for_bisection(envelope, stride),
     }
     return Values(
         vehicle=vehicle.name,
@@ -108,12 +115,24 @@ def costate_values_of(
         constants=CONSTANTS | of_modules((dual, _names_of_dual(table.has_start))),
         costate={
             "SHARED_PIECES": len(envelope.slope),
-            "SHARED_STRIDE": 1 << max((len(envelope.slope) - 1).bit_length() - 1, 0),
+            "SHARED_STRIDE": stride,
             "LINE_PIECES": len(curves.slope),
             "RUN_STATES": run,
             "REST_STATES": rest,
         },
     )
+
+
+def _for_bisection(envelope: Curves, stride: int) -> Floats:
+    """Slope, end, begin and intercept of as many pieces as halvings from that stride can tell apart.
+
+    Nothing lies beyond the end of the last piece, or of those after it, which are none.
+    """
+    e = envelope
+    end = np.append(e.end_w[:-1], BEYOND_ALL_W)
+    rows = np.column_stack([e.slope, end, e.begin_w, e.intercept])
+    table: Floats = np.vstack([rows, *[rows[-1:]] * (2 * stride - len(rows))]).ravel()
+    return table
 
 
 def _names_of_dual(has_start: bool) -> str:

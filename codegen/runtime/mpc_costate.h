@@ -7,16 +7,27 @@
 #include "mpc_config.h"
 #include "mpc_rows.h"
 
+/* Net power, the limits of the engine, and the fuel there. */
+typedef struct {
+    mpc_real net_w;
+    mpc_real low_w;
+    mpc_real high_w;
+    mpc_real low_g_per_s;
+    mpc_real high_g_per_s;
+} mpc_costate_asked;
+
 /* The program of a stage, SOC and coolant temperature from the origin. */
 typedef struct {
     mpc_stage_program of; /* generated, see qpmpc.costate.program */
     mpc_real price_t;     /* cost of a kelvin at its end, of its own and of the next one's growth */
     mpc_real per_end;     /* 1 / t_end */
-    mpc_real decay;       /* of the coolant, at least LEAST_DECAY, and its inverse */
-    mpc_real per_decay;
+    mpc_real decay;       /* of the coolant, at least LEAST_DECAY */
     mpc_real least_of_charge; /* responses of a stage that has none of its own now */
     mpc_real least_of_heat;
-    mpc_real width;  /* cost over which on and off are smoothed, g */
+    mpc_costate_asked asked;        /* where there is a choice of on or off */
+    mpc_costate_asked forced_asked; /* where there is none */
+    mpc_real width;     /* cost over which on and off are smoothed, g */
+    mpc_real per_width; /* 1 / width */
     mpc_real must;   /* 1 where the engine has to run all the time, else 0 */
     mpc_real cannot; /* 1 where it must not, else 0 */
     mpc_real forced; /* share of the seconds without a choice in a stage that has both, and the rest
@@ -55,22 +66,38 @@ typedef struct {
 #endif
 } mpc_costate_dual;
 
+/* Derivatives of the change of SOC to lambda, of that to nu, of the coolant's heat to nu. */
+typedef struct {
+    mpc_real charge;
+    mpc_real cross;
+    mpc_real heat;
+} mpc_responses;
+
+/* What a stage answers to its prices, on the way. */
+typedef struct {
+    mpc_responses by_switch;
+    mpc_responses always;
+    mpc_real switch_charge; /* change of SOC, and heat, by on instead of off */
+    mpc_real switch_heat;
+    mpc_real spent_w; /* without a choice: internal power of the battery, and heat */
+    mpc_real heat;
+} mpc_costate_answer;
+
 /* A term of a running sum, see mpc_costate_funnel.c. */
 typedef struct {
     mpc_real offset;
     mpc_real response;
-    mpc_real low;
-    mpc_real high;
+    mpc_real limit[2]; /* of the sum: lower, upper */
+    mpc_real bound[2]; /* of the price, by these limits, on the way */
     mpc_real decay;
-    mpc_real per_decay; /* its inverse */
-    mpc_real price;     /* found */
-    mpc_real ends;      /* 1 where a stretch of one price ends with it, else 0 */
+    mpc_real price; /* found */
 } mpc_costate_term;
 
 typedef struct {
     mpc_stage_road road;
     mpc_costate_program p;
     mpc_costate_dual dual[2]; /* where the search is, and what it tries */
+    mpc_costate_answer answer;
     mpc_real x[MPC_VARS];     /* SOC and coolant temperature from the origin */
     mpc_real y[MPC_ROWS];     /* multipliers of the SOC and the coolant limits */
     mpc_real goal_charge;     /* aim of a round */
@@ -88,28 +115,5 @@ typedef struct {
     int32_t here;   /* which dual the search is at */
     mpc_real certificate_g;
 } mpc_search;
-
-/* Least of a stage with its engine on. */
-typedef struct {
-    mpc_drive drive;
-    mpc_real cost;
-    mpc_real slope_g_per_j;
-    mpc_real ratio;
-    mpc_real gives;
-} mpc_least;
-
-/* Net power, and the limits of the engine. */
-typedef struct {
-    mpc_real net_w;
-    mpc_real low_w;
-    mpc_real high_w;
-} mpc_asked;
-
-/* Prices of fuel, engine power and internal power of the battery. */
-typedef struct {
-    mpc_real fuel;
-    mpc_real power;
-    mpc_real internal;
-} mpc_prices;
 
 #endif

@@ -10,7 +10,7 @@
 #include "mpc_model.h"
 #include "mpc_real.h"
 
-#define NO_LIMIT REAL(1.0e20)
+#define NO_LIMIT REAL(1.0e9)
 #define SOC_TERMS (MPC_SHORT + MPC_BLOCKS)
 
 static int32_t of_block(int32_t term) { return MPC_SHORT + (MPC_CLASSES * (term - MPC_SHORT)); }
@@ -22,8 +22,8 @@ static void add_charge(mpc_costate_term *term, const mpc_stage *stage, int32_t w
     const mpc_real response = dual->of_charge + stage->p.least_of_charge;
     term->offset -= response * dual->charge;
     term->response += response;
-    term->low = stage->p.of.soc_low - dual->soc; /* of the last stage */
-    term->high = stage->p.of.soc_high - dual->soc;
+    term->limit[0] = stage->p.of.soc_low - dual->soc; /* of the last stage */
+    term->limit[1] = stage->p.of.soc_high - dual->soc;
 }
 
 static void aim_charge(mpc_state *state)
@@ -33,10 +33,9 @@ static void aim_charge(mpc_state *state)
     for (int32_t i = 0; i < SOC_TERMS; i++) {
         const int32_t stages = (i < MPC_SHORT) ? 1 : MPC_CLASSES;
         const int32_t first = (i < MPC_SHORT) ? i : of_block(i);
+        term[i].price = MPC_NO_PRICE;
         term[i].offset = REAL(0.0);
         term[i].response = REAL(0.0);
-        term[i].decay = REAL(1.0);
-        term[i].per_decay = REAL(1.0);
         for (int32_t k = first; k < (first + stages); k++) {
             add_charge(&term[i], &state->stage[k], which);
         }
@@ -79,14 +78,14 @@ static void aim_heat(mpc_state *state)
         present += dual->heat;
         term[k].response = (dual->of_heat + p->least_of_heat) * p->per_end * p->per_end;
         term[k].offset = (more * p->per_end) + (term[k].response * (given - present));
-        term[k].low = (p->of.t_low - dual->t_cl_k) - (NO_LIMIT * above(own, REAL(0.0)));
-        term[k].high = (p->of.t_high - dual->t_cl_k) + (NO_LIMIT * above(REAL(0.0), own));
+        term[k].limit[0] = (p->of.t_low - dual->t_cl_k) - (NO_LIMIT * above(own, REAL(0.0)));
+        term[k].limit[1] = (p->of.t_high - dual->t_cl_k) + (NO_LIMIT * above(REAL(0.0), own));
         term[k].decay = p->decay;
-        term[k].per_decay = p->per_decay;
+        term[k].price = MPC_NO_PRICE;
         given *= p->decay;
         present *= p->decay;
     }
-    mpc_costate_funnel(&state->search, MPC_STAGES, (HEAT_HALF_STEPS * MPC_STAGES) / 2);
+    mpc_costate_funnel_decaying(&state->search, MPC_STAGES, (HEAT_HALF_STEPS * MPC_STAGES) / 2);
     mpc_real after = REAL(0.0); /* price of the next stage, times its decay */
     for (int32_t k = MPC_STAGES - 1; k >= 0; k--) {
         mpc_stage *const stage = &state->stage[k];

@@ -20,6 +20,10 @@ static mpc_real price_coolant(mpc_state *state, int32_t which)
         const mpc_costate_program *const p = &state->stage[k].p;
         mpc_costate_dual *const dual = &state->stage[k].dual[which];
         dual->nu = ((dual->heat - p->price_t) - after) * p->per_end;
+#if MPC_STARTS
+        dual->start_g = (mpc_par.start_fuel_g + (dual->charge * mpc_par.cranking_soc))
+                        - (dual->nu * p->of.start_k);
+#endif
         after = p->of.t_before * dual->nu;
         /* a lower limit where the multiplier is above 0, an upper one where it is below */
         const mpc_real jump = dual->charge - next;
@@ -39,43 +43,96 @@ static mpc_real start_price(const mpc_stage *stage, const mpc_costate_dual *dual
 {
     return real_max(dual->start_g, REAL(0.0)) * stage->p.rises;
 }
-#endif
 
-/* What a stage pays for its on-share because of starts, g, in `price` of the terms. */
-#if MPC_STARTS
-static void price_starts(mpc_state *state, int32_t which)
+/* Cost of on less that of off; where there is no choice as much as decides: beyond the prices of
+ * the starts before and after no start is worth it. */
+static mpc_real difference_g(const mpc_costate_program *p, const mpc_costate_dual *dual,
+                             mpc_real own, mpc_real after)
+{
+    const mpc_real decided = p->width + REAL_ABS(own) + REAL_ABS(after);
+    const mpc_real twice = decided + decided;
+    const mpc_real least = (twice * p->cannot) - decided;
+    const mpc_real most = decided - (twice * p->must);
+    return real_clip(dual->on_g - dual->off_g, least, most);
+}
+
+/* The seconds ahead are a chain. */
+static void price_starts_ahead(mpc_state *state, int32_t which)
 {
     mpc_costate_term *const term = state->search.term;
     const mpc_real on_now = (mpc_real)state->watch.good.engine_on;
     mpc_real after = REAL(0.0);
-    for (int32_t k = MPC_STAGES - 1; k >= 0; k--) {
+    for (int32_t k = MPC_SHORT - 1; k >= 0; k--) {
         const mpc_stage *const stage = &state->stage[k];
         const mpc_costate_dual *const dual = &stage->dual[which];
         const mpc_real own = start_price(stage, dual);
         const mpc_real width = stage->p.width;
-        const mpc_real decided = width + REAL_ABS(own) + REAL_ABS(after);
-        /* cost of on less that of off; where there is no choice as much as decides */
-        const mpc_real twice = decided + decided;
-        const mpc_real least = (twice * stage->p.cannot) - decided;
-        const mpc_real most = decided - (twice * stage->p.must);
-        term[k].offset = real_clip(dual->on_g - dual->off_g, least, most) - (REAL(0.5) * width);
+        term[k].offset = difference_g(&stage->p, dual, own, after) - (REAL(0.5) * width);
         term[k].response = width;
-        term[k].low = real_min(after, REAL(0.0));
-        term[k].high = real_max(after, REAL(0.0));
-        term[k].decay = REAL(1.0);
-        term[k].per_decay = REAL(1.0);
+        term[k].limit[0] = real_min(after, REAL(0.0));
+        term[k].limit[1] = real_max(after, REAL(0.0));
+        term[k].price = MPC_NO_PRICE;
         after = own;
     }
     const mpc_real first = (REAL(1.0) - on_now) * real_max(after, REAL(0.0));
     term[0].offset += first;
-    mpc_costate_funnel(&state->search, MPC_STAGES, (START_HALF_STEPS * MPC_STAGES) / 2);
+    mpc_costate_funnel(&state->search, MPC_SHORT, (START_HALF_STEPS * MPC_SHORT) / 2);
     mpc_real edge = REAL(0.0);
     mpc_real before = first;
-    for (int32_t k = 0; k < MPC_STAGES; k++) {
+    for (int32_t k = 0; k < MPC_SHORT; k++) {
         const mpc_real moved = (edge + term[k].offset) + (term[k].response * term[k].price);
-        edge = real_clip(moved, term[k].low, term[k].high);
+        edge = real_clip(moved, term[k].limit[0], term[k].limit[1]);
         term[k].price = before - edge;
         before = edge;
+    }
+}
+
+#if MPC_CLASSES > 1
+/* The stages of a block, which are three, in closed form: the price between the first two is the
+ * best for any between the last two, whose own best is therefore that of the one or the other
+ * limit, or of none. */
+static void price_starts_of_block(const mpc_stage *block, int32_t which, mpc_costate_term *term)
+{
+    const mpc_costate_dual *const dual[3] = {&block[0].dual[which], &block[1].dual[which],
+                                             &block[2].dual[which]};
+    const mpc_real one = start_price(&block[1], dual[1]);
+    const mpc_real two = start_price(&block[2], dual[2]);
+    const mpc_real first_g = difference_g(&block[0].p, dual[0], REAL(0.0), one);
+    const mpc_real middle_g = difference_g(&block[1].p, dual[1], one, two);
+    const mpc_real last_g = difference_g(&block[2].p, dual[2], two, REAL(0.0));
+    const mpc_real w_first = block[0].p.width;
+    const mpc_real w_middle = block[1].p.width;
+    const mpc_real w_last = block[2].p.width;
+    const mpc_real low = real_min(one, REAL(0.0));
+    const mpc_real high = real_max(one, REAL(0.0));
+    const mpc_real per = REAL(1.0) / (w_first + w_middle);
+    const mpc_real known = ((first_g * w_middle) - (middle_g * w_first)) * per;
+    const mpc_real follows = w_first * per;
+    const mpc_real right = (middle_g * w_last) - (last_g * w_middle);
+    const mpc_real per_last = REAL(1.0) / (w_middle + w_last);
+    const mpc_real at_low = (right + (low * w_last)) * per_last;
+    const mpc_real at_high = (right + (high * w_last)) * per_last;
+    const mpc_real free = (right + (known * w_last))
+                          / (w_middle + ((REAL(1.0) - follows) * w_last));
+    const mpc_real best = real_clip(free, at_low, at_high);
+    const mpc_real second = real_clip(best, real_min(two, REAL(0.0)), real_max(two, REAL(0.0)));
+    const mpc_real edge = real_clip(known + (follows * second), low, high);
+    term[0].price = -edge;
+    term[1].price = edge - second;
+    term[2].price = second;
+}
+#endif
+
+/* What a stage pays for its on-share because of starts, g, in `price` of the terms. */
+static void price_starts(mpc_state *state, int32_t which)
+{
+    price_starts_ahead(state, which);
+    for (int32_t k = MPC_SHORT; k < MPC_STAGES; k += MPC_CLASSES) {
+#if MPC_CLASSES > 1
+        price_starts_of_block(&state->stage[k], which, &state->search.term[k]);
+#else
+        state->search.term[k].price = REAL(0.0);
+#endif
     }
 }
 #else
@@ -92,115 +149,62 @@ static void price_starts(mpc_state *state, int32_t which)
 typedef struct {
     mpc_real soc;
     mpc_real t_cl_k;
-    mpc_real share;
     mpc_real cost_g;
+#if MPC_STARTS
+    mpc_real share;
+#endif
 } way;
-
-static mpc_real heat_of(const mpc_stage_program *of, const mpc_drive *drive)
-{
-    return (of->per_fuel * drive->fuel_g_per_s) - (of->per_power * drive->power_w);
-}
-
-/* Derivatives of the change of SOC to lambda, of that to nu, of the coolant's heat to nu. */
-typedef struct {
-    mpc_real charge;
-    mpc_real cross;
-    mpc_real heat;
-} responses;
-
-/* The seconds of a longer stage in which the engine must run, at a power of their own. */
-static responses drive_forced(mpc_stage *stage, int32_t which)
-{
-    const mpc_costate_program *const p = &stage->p;
-    mpc_costate_dual *const dual = &stage->dual[which];
-    const mpc_prices price = mpc_costate_prices(stage, dual);
-    const mpc_asked asked = {p->of.forced_net_w, p->of.forced_low_w, p->of.forced_high_w};
-    const mpc_least found = mpc_costate_least_shared(&asked, &price);
-    const mpc_real v_charge = p->of.charge_per_w * found.ratio;
-    const mpc_real v_heat = (p->of.per_fuel * found.slope_g_per_j) - p->of.per_power;
-    const mpc_real gives = p->forced * found.gives;
-    dual->forced = found.drive;
-    dual->forced_g = p->forced * found.cost;
-    const responses found_ones = {gives * v_charge * v_charge, gives * v_charge * v_heat,
-                                  gives * v_heat * v_heat};
-    return found_ones;
-}
 
 /* On-share of a stage, and where it leads. */
 static void go_on(mpc_stage *stage, int32_t which, mpc_real starts_g, way *at)
 {
     const mpc_costate_program *const p = &stage->p;
-    const mpc_stage_program *const of = &p->of;
+    const mpc_costate_answer *const answer = &stage->answer;
     mpc_costate_dual *const dual = &stage->dual[which];
-    const mpc_real per_width = REAL(1.0) / p->width;
-    const mpc_real wish = REAL(0.5) - (((dual->on_g - dual->off_g) + starts_g) * per_width);
-    const mpc_real clipped = real_clip(wish, REAL(0.0), REAL(1.0));
-    const mpc_real share = real_max((REAL(1.0) - p->cannot) * clipped, p->must);
-    const mpc_real turn = above(share * (REAL(1.0) - share), REAL(0.0)) * per_width;
-    const mpc_real off_w = stage->road.free_internal_off_w;
-    const mpc_real by_charge = p->free * of->charge_per_w * (off_w - dual->on.internal_w);
-    const mpc_real by_heat = p->free * heat_of(of, &dual->on);
-    /* here they are still what the stage gives while on, its slopes */
-    const mpc_real gives = p->free * share * dual->of_charge;
-    const mpc_real v_charge = dual->cross;
-    const mpc_real v_heat = dual->of_heat;
-    dual->of_charge = (gives * v_charge * v_charge) + (turn * by_charge * by_charge);
-    dual->cross = (gives * v_charge * v_heat) + (turn * by_charge * by_heat);
-    dual->of_heat = (gives * v_heat * v_heat) + (turn * by_heat * by_heat);
+    const mpc_real by_charge = answer->switch_charge;
+    const mpc_real by_heat = answer->switch_heat;
+    const mpc_real difference = (dual->on_g - dual->off_g) + starts_g;
+    const mpc_real wish = real_clip(REAL(0.5) - (difference * p->per_width), REAL(0.0), REAL(1.0));
+    const mpc_real share = real_max((REAL(1.0) - p->cannot) * wish, p->must);
+    const mpc_real rest = REAL(1.0) - share;
+    const mpc_real turn = above(share * rest, REAL(0.0)) * p->per_width;
+    const mpc_real turn_charge = turn * by_charge;
     dual->share = share;
-    const mpc_real spent_w = (p->free * off_w) + (p->forced * dual->forced.internal_w);
-    mpc_real change = (share * by_charge) - (of->charge_per_w * spent_w);
-    mpc_real heat = (share * by_heat) + (p->forced * heat_of(of, &dual->forced));
+    dual->of_charge = answer->always.charge + (share * answer->by_switch.charge)
+                      + (turn_charge * by_charge);
+    dual->cross = answer->always.cross + (share * answer->by_switch.cross)
+                  + (turn_charge * by_heat);
+    dual->of_heat = answer->always.heat + (share * answer->by_switch.heat)
+                    + (turn * by_heat * by_heat);
+    const mpc_real spent_w = (p->free * stage->road.free_internal_off_w) + answer->spent_w;
+    mpc_real change = (share * by_charge) - (p->of.charge_per_w * spent_w);
+    mpc_real heat = (share * by_heat) + answer->heat;
 #if MPC_STARTS
     const mpc_real starts = real_max(p->rises * (share - at->share), REAL(0.0));
     change -= mpc_par.cranking_soc * starts;
-    heat += of->start_k * starts;
-#endif
+    heat += p->of.start_k * starts;
     at->share = share;
+#endif
     at->soc += change;
-    at->t_cl_k = ((of->settled + heat) - (of->t_before * at->t_cl_k)) * p->per_end;
+    at->t_cl_k = ((p->of.settled + heat) - (p->of.t_before * at->t_cl_k)) * p->per_end;
     dual->soc = at->soc;
     dual->t_cl_k = at->t_cl_k;
-    at->cost_g += (share * dual->on_g) + ((REAL(1.0) - share) * dual->off_g) + (share * starts_g)
-                  + (REAL(0.5) * p->width * ((share * share) - share)) + dual->forced_g;
+    at->cost_g += (dual->off_g + dual->forced_g)
+                  + (share * (difference - (REAL(0.5) * p->width * rest)));
 }
 
 void mpc_costate_dual_at(mpc_state *state, int32_t which)
 {
     const mpc_real constant_g = price_coolant(state, which);
-    for (int32_t k = 0; k < MPC_STAGES; k++) {
-        mpc_stage *const stage = &state->stage[k];
-        const mpc_stage_program *const of = &stage->p.of;
-        mpc_costate_dual *const dual = &stage->dual[which];
-        const mpc_prices price = mpc_costate_prices(stage, dual);
-        const mpc_asked asked = asked_of(stage);
-        const mpc_least on = mpc_costate_least_shared(&asked, &price);
-        dual->on = on.drive;
-        dual->on_g = stage->p.free * on.cost;
-        dual->off_g = stage->p.free * price.internal * stage->road.free_internal_off_w;
-#if MPC_STARTS
-        dual->start_g = (mpc_par.start_fuel_g + (dual->charge * mpc_par.cranking_soc))
-                        - (dual->nu * of->start_k);
-#endif
-        dual->of_charge = on.gives;
-        dual->cross = of->charge_per_w * on.ratio;
-        dual->of_heat = (of->per_fuel * on.slope_g_per_j) - of->per_power;
-    }
+    mpc_costate_minimise(state, which);
     price_starts(state, which);
-    way at = {REAL(0.0), REAL(0.0), (mpc_real)state->watch.good.engine_on, REAL(0.0)};
+#if MPC_STARTS
+    way at = {REAL(0.0), REAL(0.0), REAL(0.0), (mpc_real)state->watch.good.engine_on};
+#else
+    way at = {REAL(0.0), REAL(0.0), REAL(0.0)};
+#endif
     for (int32_t k = 0; k < MPC_STAGES; k++) {
-        mpc_stage *const stage = &state->stage[k];
-        mpc_costate_dual *const dual = &stage->dual[which];
-        responses more = {REAL(0.0), REAL(0.0), REAL(0.0)};
-        dual->forced = dual->on;
-        dual->forced_g = REAL(0.0);
-        if (k >= MPC_SHORT) {
-            more = drive_forced(stage, which);
-        }
-        go_on(stage, which, state->search.term[k].price, &at);
-        dual->of_charge += more.charge;
-        dual->cross += more.cross;
-        dual->of_heat += more.heat;
+        go_on(&state->stage[k], which, state->search.term[k].price, &at);
     }
     state->search.constant_g[which] = constant_g;
     state->search.value[which] = at.cost_g + constant_g;

@@ -12,93 +12,91 @@
 #include "mpc_costate_parts.h"
 #include "mpc_real.h"
 
-#if MPC_F32
-#define TIE REAL(1.0e-6)
-#else
-#define TIE REAL(1.0e-12)
-#endif
+#define SURELY REAL(1.0e37) /* times any difference of two prices is 1 or more */
 
-/* A bound of the stretch's price at the present term; where it was made, the price there, and x. */
-typedef struct {
-    mpc_real price;
-    mpc_real at;
-    mpc_real own;
-    mpc_real x;
-} bound;
-
-static void set_bound(bound *of, mpc_real is_new, mpc_real at, mpc_real price, mpc_real x)
+/* 1 where a is above b, else 0, without a comparison that a compiler could make a branch of. */
+static inline mpc_real surely_above(mpc_real a, mpc_real b)
 {
-    of->at = blend(is_new, at, of->at);
-    of->own = blend(is_new, price, of->own);
-    of->x = blend(is_new, x, of->x);
+    return real_min(real_max((a - b) * SURELY, REAL(0.0)), REAL(1.0));
 }
 
-/* A term beyond the last, whose limit is the price 0: where that is met the walk ends. */
+/* A term beyond the last, which moves so easily that its limits leave the price 0 alone: where that
+ * is met the walk ends. */
 static void put_end(mpc_costate_term *end)
 {
-    const mpc_costate_term zero = {REAL(0.0), REAL(1.0), REAL(0.0), REAL(0.0),
-                                   REAL(0.0), REAL(1.0), REAL(0.0), REAL(0.0)};
+    const mpc_costate_term zero = {REAL(0.0),         ENDLESS_RESPONSE,
+                                   {REAL(0.0), REAL(0.0)}, {REAL(0.0), REAL(0.0)},
+                                   REAL(1.0),         REAL(0.0)};
     *end = zero;
 }
 
-/* Places are counted in mpc_real, which holds them exactly, so that all choices are arithmetic. */
-void mpc_costate_funnel(mpc_search *search, int32_t count, int32_t steps)
+/* Both kinds of walk; the compiler knows whether the terms decay. Places are counted in mpc_real,
+ * which holds them exactly, so that choices are arithmetic. */
+static inline void walk(mpc_search *search, int32_t count, int32_t steps, int32_t decays)
 {
     mpc_costate_term *const term = search->term;
     const mpc_real last = (mpc_real)count;
-    const mpc_real nowhere = last + REAL(1.0);
-    bound least = {-UNLIMITED, REAL(0.0), REAL(0.0), REAL(0.0)};
-    bound most = {UNLIMITED, REAL(0.0), REAL(0.0), REAL(0.0)};
+    mpc_real least = -UNLIMITED; /* bounds of the stretch's price at the present term */
+    mpc_real most = UNLIMITED;
+    mpc_real least_at = REAL(0.0); /* where they were made */
+    mpc_real most_at = REAL(0.0);
     mpc_real x = REAL(0.0);
     mpc_real moves = REAL(0.0);
     mpc_real k = REAL(0.0);
-    for (int32_t i = 0; i < count; i++) {
-        term[i].ends = REAL(0.0);
-    }
     put_end(&term[count]);
     for (int32_t step = 0; step < steps; step++) {
-        const mpc_costate_term *const own = &term[(int32_t)k];
-        x = (own->decay * x) + own->offset;
-        moves = (own->decay * own->decay * moves) + own->response;
-        least.price = real_max(least.price * own->per_decay, -UNLIMITED);
-        most.price = real_min(most.price * own->per_decay, UNLIMITED);
+        mpc_costate_term *const own = &term[(int32_t)k];
+        if (decays != 0) {
+            x *= own->decay;
+            moves *= own->decay * own->decay;
+            least = real_max(least / own->decay, -UNLIMITED);
+            most = real_min(most / own->decay, UNLIMITED);
+        }
+        x += own->offset;
+        moves += own->response;
         const mpc_real movable = above(moves, LEAST_RESPONSE);
         const mpc_real per_move = movable / real_max(moves, LEAST_RESPONSE);
         const mpc_real far = UNLIMITED - (UNLIMITED * movable);
-        const mpc_real low = ((own->low - x) * per_move) - far;
-        const mpc_real high = ((own->high - x) * per_move) + far;
-        /* the stretch ends at the lower bound, the upper one, or here, or it goes on */
-        const mpc_real at_least = above(least.price, high + (TIE * REAL_ABS(high)));
-        const mpc_real at_most = (REAL(1.0) - at_least)
-                                 * above(low - (TIE * REAL_ABS(low)), most.price);
-        const mpc_real is_low = not_below(low, least.price);
-        set_bound(&least, is_low, k, low, own->low);
-        set_bound(&most, not_below(most.price, high), k, high, own->high);
-        least.price = real_max(least.price, low);
-        most.price = real_min(most.price, high);
-        const mpc_real here = ((REAL(1.0) - at_least) - at_most)
-                              * not_below(least.price, most.price);
-        const mpc_real by_least = at_least + (here * is_low);
-        const mpc_real ended = at_least + at_most + here;
-        const mpc_real by_most = ended - by_least;
-        const mpc_real goes_on = REAL(1.0) - ended;
-        const mpc_real at = (by_least * least.at) + (by_most * most.at);
-        const mpc_real place = at + (goes_on * nowhere);
-        mpc_costate_term *const written = &term[(int32_t)place];
-        written->price = (by_least * least.own) + (by_most * most.own);
-        written->ends = REAL(1.0);
-        x = ((by_least * least.x) + (by_most * most.x)) + (goes_on * x);
+        const mpc_real low = ((own->limit[0] - x) * per_move) - far;
+        const mpc_real high = ((own->limit[1] - x) * per_move) + far;
+        least_at = (low >= least) ? k : least_at; /* always where a stretch begins */
+        most_at = (high <= most) ? k : most_at;
+        least = real_max(least, low);
+        most = real_min(most, high);
+        /* where one bound has met the other the stretch ends, at the older of them */
+        const mpc_real goes_on = surely_above(most, least);
+        const mpc_real ended = REAL(1.0) - goes_on;
+        const mpc_real at = real_min(least_at, most_at);
+        const int32_t by_most = (most_at < least_at) ? 1 : 0;
+        mpc_costate_term *const older = &term[(int32_t)at];
+        mpc_real price = pick(by_most, most, least);
+        if (decays != 0) {
+            own->bound[0] = low;
+            own->bound[1] = high;
+            price = older->bound[by_most];
+        }
+        older->price = price + (goes_on * MPC_NO_PRICE);
+        x = (goes_on * x) + (ended * older->limit[by_most]);
         moves *= goes_on;
-        least.price = (goes_on * least.price) - (ended * UNLIMITED);
-        most.price = (goes_on * most.price) + (ended * UNLIMITED);
-        k = real_min((at + (goes_on * k)) + REAL(1.0), last);
+        least = (goes_on * least) - (ended * UNLIMITED);
+        most = (goes_on * most) + (ended * UNLIMITED);
+        k = real_min((k - (ended * (k - at))) + REAL(1.0), last);
     }
     /* of a walk cut short, the rest has the price that meets the limits seen; 0 at the end */
-    const mpc_real nearest = real_max(least.price, real_min(most.price, REAL(0.0)));
-    mpc_real price = nearest;
+    mpc_real price = real_max(least, real_min(most, REAL(0.0)));
     for (int32_t i = count - 1; i >= 0; i--) {
-        price = blend(term[i].ends, term[i].price, price);
+        price = blend(surely_above(UNLIMITED, term[i].price), term[i].price, price);
         term[i].price = price;
-        price *= term[i].decay;
+        price *= (decays != 0) ? term[i].decay : REAL(1.0);
     }
+}
+
+void mpc_costate_funnel(mpc_search *search, int32_t count, int32_t steps)
+{
+    walk(search, count, steps, 0);
+}
+
+void mpc_costate_funnel_decaying(mpc_search *search, int32_t count, int32_t steps)
+{
+    walk(search, count, steps, 1);
 }

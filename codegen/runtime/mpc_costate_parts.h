@@ -14,20 +14,17 @@ static inline mpc_real pick(int32_t condition, mpc_real yes, mpc_real no)
 /* mpc_costate_program.c */
 void mpc_costate_program_fill(mpc_state *state);
 
-/* mpc_costate_stage.c */
-mpc_prices mpc_costate_prices(const mpc_stage *stage, const mpc_costate_dual *dual);
-mpc_least mpc_costate_least_shared(const mpc_asked *asked, const mpc_prices *price);
-mpc_least mpc_costate_least_exact(const mpc_asked *asked, const mpc_prices *price);
+/* mpc_costate_stage.c: all stages minimised with the envelope of f, which is found there too; one
+ * with f itself */
+void mpc_costate_minimise(mpc_state *state, int32_t which);
+mpc_real mpc_costate_shared_fuel(mpc_real power_w);
+void mpc_costate_minimise_exactly(mpc_stage *stage, int32_t which);
 
-/* What is asked of a stage in the seconds with a choice. */
-static inline mpc_asked asked_of(const mpc_stage *stage)
-{
-    const mpc_asked asked = {stage->road.free_net_w, stage->p.of.low_w, stage->p.of.high_w};
-    return asked;
-}
-
-/* mpc_costate_funnel.c: prices of the first terms, in `price` */
+/* mpc_costate_funnel.c: prices of the first terms, in `price`, where they do not decay and where
+ * they do; MPC_NO_PRICE has to be there before */
+#define MPC_NO_PRICE (REAL(2.0) * UNLIMITED)
 void mpc_costate_funnel(mpc_search *search, int32_t count, int32_t steps);
+void mpc_costate_funnel_decaying(mpc_search *search, int32_t count, int32_t steps);
 
 /* mpc_costate_dual.c: evaluate the dual `which` at its multipliers */
 void mpc_costate_dual_at(mpc_state *state, int32_t which);

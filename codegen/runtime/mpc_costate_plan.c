@@ -8,21 +8,6 @@
 #include "mpc_model.h"
 #include "mpc_real.h"
 
-/* The seconds ahead once more, on the true curves. */
-static void minimise_exactly(mpc_state *state)
-{
-    const int32_t which = state->search.here;
-    for (int32_t k = 0; k < MPC_SHORT; k++) {
-        mpc_stage *const stage = &state->stage[k];
-        mpc_costate_dual *const dual = &stage->dual[which];
-        const mpc_prices price = mpc_costate_prices(stage, dual);
-        const mpc_asked asked = asked_of(stage);
-        const mpc_least on = mpc_costate_least_exact(&asked, &price);
-        dual->on = on.drive;
-        dual->on_g = on.cost;
-    }
-}
-
 /* Price of SOC below its limits that is above every multiplier of these, g per unit. */
 static mpc_real violation_price_g(const mpc_state *state)
 {
@@ -87,7 +72,10 @@ static mpc_real follow(mpc_state *state, mpc_real soc_price)
 
 int32_t mpc_method_finish(mpc_state *state, int32_t solved)
 {
-    minimise_exactly(state);
+    /* the seconds ahead once more, on the true curves */
+    for (int32_t k = 0; k < MPC_SHORT; k++) {
+        mpc_costate_minimise_exactly(&state->stage[k], state->search.here);
+    }
     const mpc_real bound = mpc_costate_choose(state) + state->search.constant_g[state->search.here];
     state->search.certificate_g = follow(state, violation_price_g(state)) - bound;
     return solved & mpc_iterate_usable(state);

@@ -13,6 +13,13 @@
 #define LONGER LONG_SWITCH_G_PER_S
 #endif
 
+static mpc_costate_asked asked(mpc_real net_w, mpc_real low_w, mpc_real high_w)
+{
+    const mpc_costate_asked made = {net_w, low_w, high_w, mpc_costate_shared_fuel(low_w),
+                                    mpc_costate_shared_fuel(high_w)};
+    return made;
+}
+
 void mpc_costate_program_fill(mpc_state *state)
 {
     mpc_stage_sums sums = {REAL(0.0)};
@@ -29,7 +36,6 @@ void mpc_costate_program_fill(mpc_state *state)
         }
         p->per_end = REAL(1.0) / p->of.t_end;
         p->decay = real_max(-p->of.t_before * p->per_end, LEAST_DECAY);
-        p->per_decay = REAL(1.0) / p->decay;
         p->must = REAL(1.0) - above(REAL(1.0), road->must_share);
         p->cannot = (REAL(1.0) - p->must) * above(mpc_par.engine_min_w, p->of.free_room_w);
         p->forced = (REAL(1.0) - p->must) * road->must_share;
@@ -38,9 +44,14 @@ void mpc_costate_program_fill(mpc_state *state)
         p->rises = road->rises * p->free * free_before;
         free_before = p->free;
 #endif
+        p->asked = asked(road->free_net_w, p->of.low_w, p->of.high_w);
+        if (k >= MPC_SHORT) {
+            p->forced_asked = asked(p->of.forced_net_w, p->of.forced_low_w, p->of.forced_high_w);
+        }
         const mpc_real per_s = pick((road->duration_s > REAL(1.0)) ? 1 : 0, LONGER, SECOND);
         p->width = real_max(per_s * road->duration_s * p->free, LEAST_SWITCH_G);
-        const mpc_real background = BACKGROUND / p->width;
+        p->per_width = REAL(1.0) / p->width;
+        const mpc_real background = BACKGROUND * p->per_width;
         const mpc_real takes = p->free * p->of.charge_per_w * mpc_par.moderate_w;
         const mpc_real warms = p->free
                                * ((p->of.per_fuel * mpc_par.moderate_g_per_s)

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 SWITCH_G_PER_S, LONG_SWITCH_G_PER_S = 0.03, 0.05
 START_SWITCH_G_PER_S, START_LONG_SWITCH_G_PER_S = 0.01, 0.015
 LEAST_SWITCH_G = 1e-4  # of a masked stage
-START_HALF_STEPS = 4  # of the funnel, half of those a stage has
+START_HALF_STEPS = 6  # of the funnel, half of those a stage has
 
 
 @dataclass(frozen=True)
@@ -188,12 +188,11 @@ def dual(program: Program, at: Multipliers) -> Dual:
     starts_g, starts = np.zeros_like(width), np.zeros_like(width)
     if p.has_start:
         start_price = np.maximum(costs.start_cost, 0.0) * p.rises
-        low, high = np.minimum(start_price, 0.0), np.maximum(start_price, 0.0)
         # beyond it no start is worth it: as good as must or must not, and as no larger difference
         decided = width + np.abs(start_price) + np.abs(np.append(start_price[1:], 0.0))
         difference = np.where(free, np.clip(difference, -decided, decided), difference)
         difference = np.where(free, difference, np.where(p.must, -decided, decided))
-        edge = _start_prices(width, difference, low, high, p.starts_on)
+        edge = _start_prices(p, width, difference, start_price)
         starts_g = edge - np.append(edge[1:], 0.0)
     share = np.clip(0.5 - (difference + starts_g) / width, 0.0, 1.0)
     share = np.where(free, share, np.where(p.must, 1.0, 0.0))
@@ -237,12 +236,25 @@ def dual(program: Program, at: Multipliers) -> Dual:
 
 
 def _start_prices(
-    width: Floats, difference: Floats, low: Floats, high: Floats, on_now: bool
+    program: Program, width: Floats, difference: Floats, price: Floats
 ) -> Floats:
-    """Prices e_k of sigma_k - sigma_k-1, shape (n,).
+    """Prices e_k of sigma_k - sigma_k-1, shape (n,), each between 0 and `price`.
 
-    sigma_k = 1/2 - (J_on - J_off + e_k - e_k+1) / W_k, so that e_k+1 is a running sum of
-    J_on - J_off - W / 2 + W sigma, between its limits: a funnel with W as response.
+    sigma_k = 1/2 - (J_on - J_off + e_k - e_k+1) / W_k. The seconds ahead are a chain, and so are
+    the stages of a block; nothing joins these.
+    """
+    short, low, high = program.short, np.minimum(price, 0.0), np.maximum(price, 0.0)
+    ahead = _chain(width[:short], difference[:short], low[:short], high[:short], program.starts_on)
+    if program.classes == 1:
+        return np.append(ahead, np.zeros(len(width) - short))
+    longer = (values[short:].reshape(-1, 3) for values in (width, difference, low, high))
+    return np.append(ahead, _of_blocks(*longer))
+
+
+def _chain(width: Floats, difference: Floats, low: Floats, high: Floats, on_now: bool) -> Floats:
+    """Prices e_k of a chain: a funnel with W as response.
+
+    e_k+1 is a running sum of J_on - J_off - W / 2 + W sigma, between its limits.
     """
     first = 0.0 if on_now else float(high[0])
     after_low, after_high = np.append(low[1:], 0.0), np.append(high[1:], 0.0)
@@ -255,6 +267,25 @@ def _start_prices(
         edge = min(max(edge + known + more, at_least), at_most)
         edges.append(edge)
     return np.array(edges[:-1])
+
+
+def _of_blocks(width: Floats, difference: Floats, low: Floats, high: Floats) -> Floats:
+    """Prices e_k of blocks of three stages, in closed form; shape (blocks, 3) each, flat result.
+
+    e_1 = clip((D_0 W_1 - D_1 W_0 + e_2 W_0) / (W_0 + W_1)) makes sigma_1 = sigma_0, as far as it
+    may, with D = J_on - J_off. With it sigma_2 = sigma_1 for an e_2 that is the one of e_1 free,
+    but no less than that of e_1 at its lower limit and no more than that at the upper.
+    """
+    w_0, w_1, w_2 = width.T
+    d_0, d_1, d_2 = difference.T
+    known = (d_0 * w_1 - d_1 * w_0) / (w_0 + w_1)
+    follows = w_0 / (w_0 + w_1)
+    right = d_1 * w_2 - d_2 * w_1
+    at_low, at_high = ((right + one[:, 1] * w_2) / (w_1 + w_2) for one in (low, high))
+    free = (right + known * w_2) / (w_1 + (1.0 - follows) * w_2)
+    second = np.clip(np.clip(free, at_low, at_high), low[:, 2], high[:, 2])
+    first = np.clip(known + follows * second, low[:, 1], high[:, 1])
+    return np.column_stack([np.zeros_like(first), first, second]).ravel()
 
 
 def coolant(program: Program, heat: Floats) -> Floats:

@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 
 LEAST_RESPONSE = 1e-20  # below it a limit cannot be met by any price
 UNLIMITED = 1e30  # a price beyond any
-TIE = 1e-12  # of prices, relative; single precision has its own
+ENDLESS_RESPONSE = 1e20  # of a term after the last: its limit leaves the price 0 alone
 
 
 def funnel(
@@ -53,13 +53,13 @@ def funnel(
     """
     count = len(offset)
     decays = np.ones(count) if decay is None else decay
-    # one term more, whose limit is the price 0: where that is met, the walk ends
+    # one term more, which leaves the price 0 alone: where that is met, the walk ends
     terms = zip(
         [*offset.tolist(), 0.0],
-        [*response.tolist(), 1.0],
+        [*response.tolist(), ENDLESS_RESPONSE],
         [*low.tolist(), 0.0],
         [*high.tolist(), 0.0],
-        [*decays.tolist(), 0.0],
+        [*decays.tolist(), 1.0],
         [*(1.0 / decays).tolist(), 1.0],
         strict=True,
     )
@@ -107,26 +107,20 @@ def _ends(terms: list[Term], steps: int) -> dict[int, float]:
         moves = term.decay * term.decay * moves + term.response
         least = max(least * term.per_decay, -UNLIMITED)
         most = min(most * term.per_decay, UNLIMITED)
-        movable = moves > LEAST_RESPONSE
+        can_move = moves > LEAST_RESPONSE
         per_move = 1.0 / max(moves, LEAST_RESPONSE)
-        low = (term.low - x) * per_move if movable else -UNLIMITED
-        high = (term.high - x) * per_move if movable else UNLIMITED
-        own_low, own_high = Bound(k, low, term.low), Bound(k, high, term.high)
-        end = None
-        if least > high + TIE * abs(high):
-            end = of_least
-        elif low - TIE * abs(low) > most:
-            end = of_most
-        else:
-            if low >= least:
-                least, of_least = low, own_low
-            if high <= most:
-                most, of_most = high, own_high
-            if least >= most:  # one price alone is left
-                end = own_low if of_least is own_low else own_high
-        if end is None:
+        low = (term.low - x) * per_move if can_move else -UNLIMITED
+        high = (term.high - x) * per_move if can_move else UNLIMITED
+        is_low, is_high = low >= least, high <= most
+        if is_low:
+            least, of_least = low, Bound(k, low, term.low)
+        if is_high:
+            most, of_most = high, Bound(k, high, term.high)
+        if least < most:
             k += 1
             continue
+        # one bound has met the other: the stretch ends at the one that was there before
+        end = of_most if is_low and not is_high else of_least
         ends[end.at] = end.price
         k, x, moves, least, most = end.at + 1, end.x, 0.0, -UNLIMITED, UNLIMITED
         if k > last:

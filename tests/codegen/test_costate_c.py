@@ -20,7 +20,7 @@ from qpmpc.codegen.pil.loop import processor_in_the_loop
 from qpmpc.controllers.mh_costate import MhCostate
 from qpmpc.controllers.receding_horizon import RecedingHorizon
 from qpmpc.controllers.settings import ControllerSettings
-from qpmpc.costate.funnel import funnel
+from qpmpc.costate.funnel import UNLIMITED, funnel
 from qpmpc.errors import InputError
 from qpmpc.faults.models import as_faults
 from qpmpc.registry import make_controller
@@ -91,7 +91,7 @@ def library(road):
     return GeneratedCostate(Trip(road, "paper-nimh")).library
 
 
-NAMES = ("offset", "response", "low", "high", "decay", "per_decay", "price", "ends")
+NO_PRICE = 2.0 * UNLIMITED
 
 
 @settings(deadline=None, max_examples=200)
@@ -106,17 +106,21 @@ def test_the_funnel_takes_the_steps_of_python(library, data):
     high = np.where(low < -10, 1e3, low + rng.uniform(0, 2, n) * (rng.random(n) < 0.8))
     decay = rng.uniform(0.3, 1, n)
 
-    class Term(ctypes.Structure):
-        _fields_ = [(name, ctypes.c_double) for name in NAMES]
+    def prices(walk, decay):
+        """Columns of a term: offset, response, two limits, two bounds, decay, price."""
+        bounds = np.zeros((2, n))
+        rows = np.vstack([offset, response, low, high, bounds, decay, np.full(n, NO_PRICE)]).T
+        terms = np.zeros((library.values.sizes.stages + 2, 8))
+        terms[:n] = rows
+        walk(terms.ctypes.data_as(ctypes.c_void_p), n, steps)
+        return terms[:n, -1]
 
-    terms = (Term * (library.values.sizes.stages + 2))()
-    for k in range(n):
-        numbers = (offset[k], response[k], low[k], high[k], decay[k], 1.0 / decay[k])
-        for name, number in zip(NAMES, numbers, strict=False):
-            setattr(terms[k], name, number)
-    library.functions.mpc_costate_funnel(terms, n, steps)
+    found = prices(library.functions.mpc_costate_funnel_decaying, decay)
     expected = funnel(offset, response, low, high, decay, steps=steps)
-    np.testing.assert_allclose([terms[k].price for k in range(n)], expected, rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8)
+    found = prices(library.functions.mpc_costate_funnel, np.ones(n))
+    expected = funnel(offset, response, low, high, steps=steps)
+    np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8)
 
 
 def test_two_controllers_side_by_side_decide_as_alone(road):
