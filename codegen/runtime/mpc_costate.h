@@ -7,14 +7,18 @@
 #include "mpc_config.h"
 #include "mpc_rows.h"
 
-/* Net power, the limits of the engine, and the fuel there. */
+/* Seconds of a stage: those with a choice of on or off and, in a longer stage that has both, those
+ * in which the engine must run. */
+enum { MPC_FREE = 0, MPC_FORCED = 1, MPC_PARTS = 2 };
+
 typedef struct {
+    mpc_real share; /* of the stage */
     mpc_real net_w;
-    mpc_real low_w;
+    mpc_real low_w; /* limits of the engine, and the fuel there */
     mpc_real high_w;
     mpc_real low_g_per_s;
     mpc_real high_g_per_s;
-} mpc_costate_asked;
+} mpc_costate_part;
 
 /* The program of a stage, SOC and coolant temperature from the origin. */
 typedef struct {
@@ -24,15 +28,12 @@ typedef struct {
     mpc_real decay;       /* of the coolant, at least LEAST_DECAY */
     mpc_real least_of_charge; /* responses of a stage that has none of its own now */
     mpc_real least_of_heat;
-    mpc_costate_asked asked;        /* where there is a choice of on or off */
-    mpc_costate_asked forced_asked; /* where there is none */
+    mpc_costate_part part[MPC_PARTS];
+    mpc_real off_charge; /* SOC that the free seconds take with the engine off */
     mpc_real width;     /* cost over which on and off are smoothed, g */
     mpc_real per_width; /* 1 / width */
     mpc_real must;   /* 1 where the engine has to run all the time, else 0 */
     mpc_real cannot; /* 1 where it must not, else 0 */
-    mpc_real forced; /* share of the seconds without a choice in a stage that has both, and the rest
-                      */
-    mpc_real free;
 #if MPC_STARTS
     mpc_real rises; /* of the on-share */
 #endif
@@ -56,11 +57,9 @@ typedef struct {
     mpc_real cross;
     mpc_real of_heat; /* of the coolant's heat to nu */
     mpc_real share;   /* sigma */
-    mpc_drive on;     /* while on, where there is a choice */
-    mpc_drive forced; /* where there is none, in a stage that has both */
-    mpc_real on_g;    /* cost of the seconds with a choice on, off, and of a start */
-    mpc_real off_g;
-    mpc_real forced_g; /* what the seconds without a choice add */
+    mpc_drive drive[MPC_PARTS]; /* while on */
+    mpc_real on_g[MPC_PARTS];   /* cost of the parts with the engine on, */
+    mpc_real off_g;             /* of the free one with it off, and of a start */
 #if MPC_STARTS
     mpc_real start_g;
 #endif
@@ -73,13 +72,10 @@ typedef struct {
     mpc_real heat;
 } mpc_responses;
 
-/* What a stage answers to its prices, on the way. */
+/* What a part answers to its prices with the engine on: SOC that it takes, heat in the coolant. */
 typedef struct {
-    mpc_responses by_switch;
-    mpc_responses always;
-    mpc_real switch_charge; /* change of SOC, and heat, by on instead of off */
-    mpc_real switch_heat;
-    mpc_real spent_w; /* without a choice: internal power of the battery, and heat */
+    mpc_responses to_prices;
+    mpc_real charge;
     mpc_real heat;
 } mpc_costate_answer;
 
@@ -97,7 +93,7 @@ typedef struct {
     mpc_stage_road road;
     mpc_costate_program p;
     mpc_costate_dual dual[2]; /* where the search is, and what it tries */
-    mpc_costate_answer answer;
+    mpc_costate_answer answer[MPC_PARTS]; /* on the way */
     mpc_real x[MPC_VARS];     /* SOC and coolant temperature from the origin */
     mpc_real y[MPC_ROWS];     /* multipliers of the SOC and the coolant limits */
     mpc_real goal_charge;     /* aim of a round */

@@ -13,40 +13,53 @@
 #define NO_LIMIT REAL(1.0e9)
 #define SOC_TERMS (MPC_SHORT + MPC_BLOCKS)
 
-static int32_t of_block(int32_t term) { return MPC_SHORT + (MPC_CLASSES * (term - MPC_SHORT)); }
-
-/* The response is that of the stage and, lest there be none, of one that is switched. */
-static void add_charge(mpc_costate_term *term, const mpc_stage *stage, int32_t which)
+/* Some stages as one term. The response is that of the stages and, lest there be none, of one that
+ * is switched. */
+static inline void put_charge(mpc_costate_term *term, const mpc_stage *first, int32_t stages,
+                              int32_t which)
 {
-    const mpc_costate_dual *const dual = &stage->dual[which];
-    const mpc_real response = dual->of_charge + stage->p.least_of_charge;
-    term->offset -= response * dual->charge;
-    term->response += response;
-    term->limit[0] = stage->p.of.soc_low - dual->soc; /* of the last stage */
-    term->limit[1] = stage->p.of.soc_high - dual->soc;
+    const mpc_stage *const last = &first[stages - 1];
+    mpc_real offset = REAL(0.0);
+    mpc_real sum = REAL(0.0);
+    for (int32_t i = 0; i < stages; i++) {
+        const mpc_costate_dual *const dual = &first[i].dual[which];
+        const mpc_real response = dual->of_charge + first[i].p.least_of_charge;
+        offset -= response * dual->charge;
+        sum += response;
+    }
+    term->offset = offset;
+    term->response = sum;
+    term->limit[0] = last->p.of.soc_low - last->dual[which].soc;
+    term->limit[1] = last->p.of.soc_high - last->dual[which].soc;
+    term->price = MPC_NO_PRICE;
+}
+
+static inline mpc_real charge_of(const mpc_costate_term *term)
+{
+    return real_clip(term->price, REAL(0.0), mpc_par.most_charge_g);
 }
 
 static void aim_charge(mpc_state *state)
 {
     const int32_t which = state->search.here;
     mpc_costate_term *const term = state->search.term;
-    for (int32_t i = 0; i < SOC_TERMS; i++) {
-        const int32_t stages = (i < MPC_SHORT) ? 1 : MPC_CLASSES;
-        const int32_t first = (i < MPC_SHORT) ? i : of_block(i);
-        term[i].price = MPC_NO_PRICE;
-        term[i].offset = REAL(0.0);
-        term[i].response = REAL(0.0);
-        for (int32_t k = first; k < (first + stages); k++) {
-            add_charge(&term[i], &state->stage[k], which);
-        }
+    mpc_stage *const stage = state->stage;
+    for (int32_t k = 0; k < MPC_SHORT; k++) {
+        put_charge(&term[k], &stage[k], 1, which);
+    }
+    for (int32_t i = 0; i < MPC_BLOCKS; i++) {
+        const int32_t first = MPC_SHORT + (MPC_CLASSES * i);
+        put_charge(&term[MPC_SHORT + i], &stage[first], MPC_CLASSES, which);
     }
     mpc_costate_funnel(&state->search, SOC_TERMS, (CHARGE_HALF_STEPS * SOC_TERMS) / 2);
-    for (int32_t i = 0; i < SOC_TERMS; i++) {
-        const int32_t stages = (i < MPC_SHORT) ? 1 : MPC_CLASSES;
-        const int32_t first = (i < MPC_SHORT) ? i : of_block(i);
-        const mpc_real price = real_clip(term[i].price, REAL(0.0), mpc_par.most_charge_g);
-        for (int32_t k = first; k < (first + stages); k++) {
-            state->stage[k].goal_charge = price;
+    for (int32_t k = 0; k < MPC_SHORT; k++) {
+        stage[k].goal_charge = charge_of(&term[k]);
+    }
+    for (int32_t i = 0; i < MPC_BLOCKS; i++) {
+        const int32_t first = MPC_SHORT + (MPC_CLASSES * i);
+        const mpc_real price = charge_of(&term[MPC_SHORT + i]);
+        for (int32_t j = 0; j < MPC_CLASSES; j++) {
+            stage[first + j].goal_charge = price;
         }
     }
 }
@@ -65,8 +78,7 @@ static void aim_heat(mpc_state *state)
     const int32_t which = state->search.here;
     mpc_costate_term *const term = state->search.term;
     const mpc_real slack = mpc_par.slack_g_per_k;
-    mpc_real given = REAL(0.0); /* M of the limits given up, and of the present multipliers */
-    mpc_real present = REAL(0.0);
+    mpc_real change = REAL(0.0); /* M of the limits given up less that of the multipliers now */
     for (int32_t k = MPC_STAGES - 1; k >= 0; k--) {
         mpc_stage *const stage = &state->stage[k];
         const mpc_costate_program *const p = &stage->p;
@@ -74,16 +86,14 @@ static void aim_heat(mpc_state *state)
         const mpc_real own = given_up(stage, dual);
         const mpc_real more = dual->cross * (stage->goal_charge - dual->charge);
         stage->goal_heat = own;
-        given += own;
-        present += dual->heat;
+        change += own - dual->heat;
         term[k].response = (dual->of_heat + p->least_of_heat) * p->per_end * p->per_end;
-        term[k].offset = (more * p->per_end) + (term[k].response * (given - present));
+        term[k].offset = (more * p->per_end) + (term[k].response * change);
         term[k].limit[0] = (p->of.t_low - dual->t_cl_k) - (NO_LIMIT * above(own, REAL(0.0)));
         term[k].limit[1] = (p->of.t_high - dual->t_cl_k) + (NO_LIMIT * above(REAL(0.0), own));
         term[k].decay = p->decay;
         term[k].price = MPC_NO_PRICE;
-        given *= p->decay;
-        present *= p->decay;
+        change *= p->decay;
     }
     mpc_costate_funnel_decaying(&state->search, MPC_STAGES, (HEAT_HALF_STEPS * MPC_STAGES) / 2);
     mpc_real after = REAL(0.0); /* price of the next stage, times its decay */

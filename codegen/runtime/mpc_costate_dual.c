@@ -20,6 +20,7 @@ static mpc_real price_coolant(mpc_state *state, int32_t which)
         const mpc_costate_program *const p = &state->stage[k].p;
         mpc_costate_dual *const dual = &state->stage[k].dual[which];
         dual->nu = ((dual->heat - p->price_t) - after) * p->per_end;
+        dual->off_g = dual->charge * p->off_charge;
 #if MPC_STARTS
         dual->start_g = (mpc_par.start_fuel_g + (dual->charge * mpc_par.cranking_soc))
                         - (dual->nu * p->of.start_k);
@@ -53,7 +54,7 @@ static mpc_real difference_g(const mpc_costate_program *p, const mpc_costate_dua
     const mpc_real twice = decided + decided;
     const mpc_real least = (twice * p->cannot) - decided;
     const mpc_real most = decided - (twice * p->must);
-    return real_clip(dual->on_g - dual->off_g, least, most);
+    return real_clip(dual->on_g[MPC_FREE] - dual->off_g, least, most);
 }
 
 /* The seconds ahead are a chain. */
@@ -159,26 +160,26 @@ typedef struct {
 static void go_on(mpc_stage *stage, int32_t which, mpc_real starts_g, way *at)
 {
     const mpc_costate_program *const p = &stage->p;
-    const mpc_costate_answer *const answer = &stage->answer;
+    const mpc_costate_answer *const free = &stage->answer[MPC_FREE];
+    const mpc_costate_answer *const forced = &stage->answer[MPC_FORCED];
     mpc_costate_dual *const dual = &stage->dual[which];
-    const mpc_real by_charge = answer->switch_charge;
-    const mpc_real by_heat = answer->switch_heat;
-    const mpc_real difference = (dual->on_g - dual->off_g) + starts_g;
+    const mpc_real by_charge = p->off_charge - free->charge; /* by on instead of off */
+    const mpc_real by_heat = free->heat;
+    const mpc_real difference = (dual->on_g[MPC_FREE] - dual->off_g) + starts_g;
     const mpc_real wish = real_clip(REAL(0.5) - (difference * p->per_width), REAL(0.0), REAL(1.0));
     const mpc_real share = real_max((REAL(1.0) - p->cannot) * wish, p->must);
     const mpc_real rest = REAL(1.0) - share;
     const mpc_real turn = above(share * rest, REAL(0.0)) * p->per_width;
     const mpc_real turn_charge = turn * by_charge;
     dual->share = share;
-    dual->of_charge = answer->always.charge + (share * answer->by_switch.charge)
+    dual->of_charge = forced->to_prices.charge + (share * free->to_prices.charge)
                       + (turn_charge * by_charge);
-    dual->cross = answer->always.cross + (share * answer->by_switch.cross)
+    dual->cross = forced->to_prices.cross + (share * free->to_prices.cross)
                   + (turn_charge * by_heat);
-    dual->of_heat = answer->always.heat + (share * answer->by_switch.heat)
+    dual->of_heat = forced->to_prices.heat + (share * free->to_prices.heat)
                     + (turn * by_heat * by_heat);
-    const mpc_real spent_w = (p->free * stage->road.free_internal_off_w) + answer->spent_w;
-    mpc_real change = (share * by_charge) - (p->of.charge_per_w * spent_w);
-    mpc_real heat = (share * by_heat) + answer->heat;
+    mpc_real change = ((share * by_charge) - p->off_charge) - forced->charge;
+    mpc_real heat = (share * by_heat) + forced->heat;
 #if MPC_STARTS
     const mpc_real starts = real_max(p->rises * (share - at->share), REAL(0.0));
     change -= mpc_par.cranking_soc * starts;
@@ -189,7 +190,7 @@ static void go_on(mpc_stage *stage, int32_t which, mpc_real starts_g, way *at)
     at->t_cl_k = ((p->of.settled + heat) - (p->of.t_before * at->t_cl_k)) * p->per_end;
     dual->soc = at->soc;
     dual->t_cl_k = at->t_cl_k;
-    at->cost_g += (dual->off_g + dual->forced_g)
+    at->cost_g += (dual->off_g + dual->on_g[MPC_FORCED])
                   + (share * (difference - (REAL(0.5) * p->width * rest)));
 }
 

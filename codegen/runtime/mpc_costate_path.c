@@ -69,10 +69,10 @@ static changes step_back(const mpc_stage *stage, const mpc_costate_dual *cost, i
     const int32_t must = (int32_t)stage->p.must;
     const int32_t cannot = (int32_t)stage->p.cannot;
     const mpc_real stopped = cost->off_g + after->off[MPC_REST_STATES - 1];
-    const mpc_real started = (cost->on_g + start_g(cost)) + after->on[MPC_RUN_STATES - 1];
+    const mpc_real started = (cost->on_g[MPC_FREE] + start_g(cost)) + after->on[MPC_RUN_STATES - 1];
     changes found = {0U, 0U};
     for (int32_t r = MPC_RUN_STATES - 1; r >= 0; r--) {
-        const mpc_real stay = cost->on_g + after->on[one_less(r)];
+        const mpc_real stay = cost->on_g[MPC_FREE] + after->on[one_less(r)];
         const int32_t better = (1 - must) & ((r == 0) ? 1 : 0) & ((stopped < stay) ? 1 : 0);
         const int32_t turns = is_driven & (cannot | better);
         after->on[r] = blend(driven, blend((mpc_real)turns, stopped, stay), after->on[r]);
@@ -134,30 +134,26 @@ static mpc_real shortest_path(mpc_state *state)
     return cost;
 }
 
-/* Least cost of a block: starts couple its stages alone. */
+/* Least cost of a block, whose stages are coupled by starts alone: of all choices of on and off up
+ * to a stage the best that end on, and off. */
 static mpc_real block_least(const mpc_stage *block, int32_t which)
 {
-    mpc_real least = REAL(1.0e30);
-    for (uint32_t choice = 0U; choice < bit(1, MPC_CLASSES); choice++) {
-        mpc_real sum = REAL(0.0);
-        int32_t before = has_bit(choice, 0);
-        for (int32_t i = 0; i < MPC_CLASSES; i++) {
-            const mpc_costate_dual *const cost = &block[i].dual[which];
-            const int32_t runs = has_bit(choice, i);
-            const mpc_real is_on = (mpc_real)runs;
-            const mpc_real wrong = blend(is_on, block[i].p.cannot, block[i].p.must);
-            sum += blend(is_on, cost->on_g, cost->off_g) + (wrong * FORBIDDEN_G);
-            const int32_t turn = runs - before;
-            const mpc_real rise = (mpc_real)turn;
-            sum += start_g(cost) * real_max(rises_of(&block[i]) * rise, REAL(0.0));
-            before = runs;
-        }
-        least = real_min(least, sum);
-    }
+    mpc_real on = REAL(0.0);
+    mpc_real off = REAL(0.0);
+    mpc_real forced = REAL(0.0);
     for (int32_t i = 0; i < MPC_CLASSES; i++) {
-        least += block[i].dual[which].forced_g;
+        const mpc_stage *const stage = &block[i];
+        const mpc_costate_dual *const cost = &stage->dual[which];
+        /* from one stage to the next a class rises or falls: the first of a block does neither */
+        const mpc_real rising = start_g(cost) * real_max(rises_of(stage), REAL(0.0));
+        const mpc_real falling = start_g(cost) * real_max(-rises_of(stage), REAL(0.0));
+        const mpc_real to_on = real_min(on, off + rising);
+        const mpc_real to_off = real_min(off, on + falling);
+        on = to_on + cost->on_g[MPC_FREE] + (stage->p.cannot * FORBIDDEN_G);
+        off = to_off + cost->off_g + (stage->p.must * FORBIDDEN_G);
+        forced += cost->on_g[MPC_FORCED];
     }
-    return least;
+    return real_min(on, off) + forced;
 }
 
 mpc_real mpc_costate_choose(mpc_state *state)

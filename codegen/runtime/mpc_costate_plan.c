@@ -32,14 +32,16 @@ static mpc_real follow(mpc_state *state, mpc_real soc_price)
         const mpc_stage_program *const of = &stage->p.of;
         const mpc_costate_dual *const dual = &stage->dual[state->search.here];
         const mpc_real share = stage->x[MPC_VAR_ON];
-        const mpc_real chosen = stage->p.free * share;
-        const mpc_real forced = stage->p.forced;
-        const mpc_real off = (stage->p.free - chosen) * stage->road.free_internal_off_w;
-        const mpc_real fuel = (chosen * dual->on.fuel_g_per_s)
-                              + (forced * dual->forced.fuel_g_per_s);
-        const mpc_real power = (chosen * dual->on.power_w) + (forced * dual->forced.power_w);
-        const mpc_real internal = (chosen * dual->on.internal_w)
-                                  + (forced * dual->forced.internal_w) + off;
+        const mpc_real free = stage->p.part[MPC_FREE].share;
+        const mpc_real forced = stage->p.part[MPC_FORCED].share;
+        const mpc_drive *const drive = dual->drive;
+        const mpc_real chosen = free * share;
+        const mpc_real off = (free - chosen) * stage->road.free_internal_off_w;
+        const mpc_real fuel = (chosen * drive[MPC_FREE].fuel_g_per_s)
+                              + (forced * drive[MPC_FORCED].fuel_g_per_s);
+        const mpc_real power = (chosen * drive[MPC_FREE].power_w) + (forced * drive[MPC_FORCED].power_w);
+        const mpc_real internal = (chosen * drive[MPC_FREE].internal_w)
+                                  + (forced * drive[MPC_FORCED].internal_w) + off;
         mpc_real heat = (of->per_fuel * fuel) - (of->per_power * power);
         mpc_real spent = of->charge_per_w * internal;
 #if MPC_STARTS
@@ -87,7 +89,7 @@ void mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p_eng
     for (int32_t k = 0; k < MPC_SHORT; k++) {
         const mpc_costate_dual *const dual = &state->stage[k].dual[state->search.here];
         on_share[k] = dual->share;
-        p_eng_w[k] = dual->share * dual->on.power_w;
+        p_eng_w[k] = dual->share * dual->drive[MPC_FREE].power_w;
     }
 }
 

@@ -13,11 +13,26 @@
 #define LONGER LONG_SWITCH_G_PER_S
 #endif
 
-static mpc_costate_asked asked(mpc_real net_w, mpc_real low_w, mpc_real high_w)
+static void put_part(mpc_costate_part *part, mpc_real net_w, mpc_real low_w, mpc_real high_w)
 {
-    const mpc_costate_asked made = {net_w, low_w, high_w, mpc_costate_shared_fuel(low_w),
-                                    mpc_costate_shared_fuel(high_w)};
-    return made;
+    part->net_w = net_w;
+    part->low_w = low_w;
+    part->high_w = high_w;
+    part->low_g_per_s = mpc_costate_shared_fuel(low_w);
+    part->high_g_per_s = mpc_costate_shared_fuel(high_w);
+}
+
+/* A second has no part without a choice: what would be evaluated of it is nil for good. */
+static void put_no_part(mpc_stage *stage)
+{
+    static const mpc_costate_answer nothing = {{REAL(0.0), REAL(0.0), REAL(0.0)},
+                                               REAL(0.0), REAL(0.0)};
+    static const mpc_drive idle = {REAL(0.0), REAL(0.0), REAL(0.0)};
+    stage->answer[MPC_FORCED] = nothing;
+    for (int32_t i = 0; i < 2; i++) {
+        stage->dual[i].drive[MPC_FORCED] = idle;
+        stage->dual[i].on_g[MPC_FORCED] = REAL(0.0);
+    }
 }
 
 void mpc_costate_program_fill(mpc_state *state)
@@ -38,22 +53,28 @@ void mpc_costate_program_fill(mpc_state *state)
         p->decay = real_max(-p->of.t_before * p->per_end, LEAST_DECAY);
         p->must = REAL(1.0) - above(REAL(1.0), road->must_share);
         p->cannot = (REAL(1.0) - p->must) * above(mpc_par.engine_min_w, p->of.free_room_w);
-        p->forced = (REAL(1.0) - p->must) * road->must_share;
-        p->free = REAL(1.0) - p->forced;
+        const mpc_real forced = (REAL(1.0) - p->must) * road->must_share;
+        const mpc_real free = REAL(1.0) - forced;
+        p->part[MPC_FREE].share = free;
+        p->part[MPC_FORCED].share = forced;
+        p->off_charge = free * p->of.charge_per_w * road->free_internal_off_w;
 #if MPC_STARTS
-        p->rises = road->rises * p->free * free_before;
-        free_before = p->free;
+        p->rises = road->rises * free * free_before;
+        free_before = free;
 #endif
-        p->asked = asked(road->free_net_w, p->of.low_w, p->of.high_w);
-        if (k >= MPC_SHORT) {
-            p->forced_asked = asked(p->of.forced_net_w, p->of.forced_low_w, p->of.forced_high_w);
+        put_part(&p->part[MPC_FREE], road->free_net_w, p->of.low_w, p->of.high_w);
+        if (k < MPC_SHORT) {
+            put_no_part(&state->stage[k]);
+        } else {
+            put_part(&p->part[MPC_FORCED], p->of.forced_net_w, p->of.forced_low_w,
+                     p->of.forced_high_w);
         }
         const mpc_real per_s = pick((road->duration_s > REAL(1.0)) ? 1 : 0, LONGER, SECOND);
-        p->width = real_max(per_s * road->duration_s * p->free, LEAST_SWITCH_G);
+        p->width = real_max(per_s * road->duration_s * free, LEAST_SWITCH_G);
         p->per_width = REAL(1.0) / p->width;
         const mpc_real background = BACKGROUND * p->per_width;
-        const mpc_real takes = p->free * p->of.charge_per_w * mpc_par.moderate_w;
-        const mpc_real warms = p->free
+        const mpc_real takes = free * p->of.charge_per_w * mpc_par.moderate_w;
+        const mpc_real warms = free
                                * ((p->of.per_fuel * mpc_par.moderate_g_per_s)
                                   - (p->of.per_power * mpc_par.moderate_w));
         p->least_of_charge = background * takes * takes;

@@ -23,7 +23,7 @@ typedef struct {
     mpc_real power_ratio;
 } prices;
 
-/* What a stage answers to them with its engine on. */
+/* What a part answers to them with its engine on. */
 typedef struct {
     mpc_drive drive;
     mpc_real cost;
@@ -97,9 +97,9 @@ mpc_real mpc_costate_shared_fuel(mpc_real power_w)
 }
 
 /* With the convex envelope of f. */
-static inline least least_shared(const mpc_costate_asked *asked, const prices *price)
+static inline least least_shared(const mpc_costate_part *part, const prices *price)
 {
-    const mpc_real net_w = asked->net_w;
+    const mpc_real net_w = part->net_w;
     const mpc_real *const row = row_of_least(price, net_w);
     const mpc_real slope = row[SLOPE];
     const mpc_real ratio = ratio_at(price, slope);
@@ -108,13 +108,13 @@ static inline least least_shared(const mpc_costate_asked *asked, const prices *p
     const mpc_real quarter = quarter_w((ratio > REAL(1.0)) ? 1 : 0);
     const mpc_real own_w = net_w - (quarter * (REAL(1.0) - square));
     const mpc_real free_w = real_max(own_w, row[BEGIN]);
-    const mpc_real power_w = real_clip(free_w, asked->low_w, asked->high_w);
+    const mpc_real power_w = real_clip(free_w, part->low_w, part->high_w);
     const mpc_real given = REAL(2.0) * quarter * square * inverse * price->per;
     const mpc_real inside = (power_w == own_w) ? REAL(1.0) : REAL(0.0);
     const mpc_real gives = inside * real_min(given, MOST_GIVEN);
     const mpc_real on_piece = (slope * power_w) + row[INTERCEPT];
-    const mpc_real no_less = (free_w < asked->low_w) ? asked->low_g_per_s : on_piece;
-    const mpc_real fuel = (free_w > asked->high_w) ? asked->high_g_per_s : no_less;
+    const mpc_real no_less = (free_w < part->low_w) ? part->low_g_per_s : on_piece;
+    const mpc_real fuel = (free_w > part->high_w) ? part->high_g_per_s : no_less;
     const mpc_real internal = internal_w(net_w - power_w);
     const mpc_real cost = (price->fuel * fuel) + (price->power * power_w)
                           + (price->internal * internal);
@@ -122,70 +122,32 @@ static inline least least_shared(const mpc_costate_asked *asked, const prices *p
     return found;
 }
 
-/* How charge and heat answer, of a share of the stage. */
-static inline mpc_responses responses_of(const mpc_stage_program *of, const least *found,
-                                         mpc_real share)
-{
-    const mpc_real v_charge = of->charge_per_w * found->ratio;
-    const mpc_real v_heat = (of->per_fuel * found->slope_g_per_j) - of->per_power;
-    const mpc_real gives = share * found->gives;
-    const mpc_real by_charge = gives * v_charge;
-    const mpc_responses answer = {by_charge * v_charge, by_charge * v_heat, gives * v_heat * v_heat};
-    return answer;
-}
-
-static inline mpc_real heat_of(const mpc_stage_program *of, const mpc_drive *drive)
-{
-    return (of->per_fuel * drive->fuel_g_per_s) - (of->per_power * drive->power_w);
-}
-
-/* The seconds with a choice. */
-static inline void minimise_free(mpc_stage *stage, mpc_costate_dual *dual, const prices *price)
-{
-    const mpc_costate_program *const p = &stage->p;
-    const mpc_real free = p->free;
-    const mpc_real off_w = stage->road.free_internal_off_w;
-    const least on = least_shared(&p->asked, price);
-    stage->answer.by_switch = responses_of(&p->of, &on, free);
-    stage->answer.switch_charge = free * p->of.charge_per_w * (off_w - on.drive.internal_w);
-    stage->answer.switch_heat = free * heat_of(&p->of, &on.drive);
-    dual->on = on.drive;
-    dual->on_g = free * on.cost;
-    dual->off_g = free * price->internal * off_w;
-}
-
-/* Those in which the engine must run, in a longer stage that has both. */
-static inline void minimise_forced(mpc_stage *stage, mpc_costate_dual *dual, const prices *price)
-{
-    const mpc_costate_program *const p = &stage->p;
-    const least found = least_shared(&p->forced_asked, price);
-    stage->answer.always = responses_of(&p->of, &found, p->forced);
-    stage->answer.spent_w = p->forced * found.drive.internal_w;
-    stage->answer.heat = p->forced * heat_of(&p->of, &found.drive);
-    dual->forced = found.drive;
-    dual->forced_g = p->forced * found.cost;
-}
-
 void mpc_costate_minimise(mpc_state *state, int32_t which)
 {
-    static const mpc_responses none = {REAL(0.0), REAL(0.0), REAL(0.0)};
-    for (int32_t k = 0; k < MPC_SHORT; k++) {
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
         mpc_stage *const stage = &state->stage[k];
+        const mpc_stage_program *const of = &stage->p.of;
         mpc_costate_dual *const dual = &stage->dual[which];
-        const prices price = prices_of(&stage->p.of, dual);
-        minimise_free(stage, dual, &price);
-        stage->answer.always = none;
-        stage->answer.spent_w = REAL(0.0);
-        stage->answer.heat = REAL(0.0);
-        dual->forced = dual->on;
-        dual->forced_g = REAL(0.0);
-    }
-    for (int32_t k = MPC_SHORT; k < MPC_STAGES; k++) {
-        mpc_stage *const stage = &state->stage[k];
-        mpc_costate_dual *const dual = &stage->dual[which];
-        const prices price = prices_of(&stage->p.of, dual);
-        minimise_free(stage, dual, &price);
-        minimise_forced(stage, dual, &price);
+        const prices price = prices_of(of, dual);
+        const int32_t parts = (k < MPC_SHORT) ? 1 : MPC_PARTS;
+        for (int32_t i = 0; i < parts; i++) {
+            const mpc_costate_part *const part = &stage->p.part[i];
+            mpc_costate_answer *const answer = &stage->answer[i];
+            const least on = least_shared(part, &price);
+            const mpc_real v_charge = of->charge_per_w * on.ratio;
+            const mpc_real v_heat = (of->per_fuel * on.slope_g_per_j) - of->per_power;
+            const mpc_real gives = part->share * on.gives;
+            const mpc_real by_charge = gives * v_charge;
+            answer->to_prices.charge = by_charge * v_charge;
+            answer->to_prices.cross = by_charge * v_heat;
+            answer->to_prices.heat = gives * v_heat * v_heat;
+            answer->charge = part->share * of->charge_per_w * on.drive.internal_w;
+            answer->heat = part->share
+                           * ((of->per_fuel * on.drive.fuel_g_per_s)
+                              - (of->per_power * on.drive.power_w));
+            dual->drive[i] = on.drive;
+            dual->on_g[i] = part->share * on.cost;
+        }
     }
 }
 
@@ -193,14 +155,15 @@ void mpc_costate_minimise(mpc_state *state, int32_t which)
 void mpc_costate_minimise_exactly(mpc_stage *stage, int32_t which)
 {
     mpc_costate_dual *const dual = &stage->dual[which];
-    const mpc_costate_asked *const asked = &stage->p.asked;
+    const mpc_costate_part *const part = &stage->p.part[MPC_FREE];
+    mpc_drive *const on = &dual->drive[MPC_FREE];
     const prices price = prices_of(&stage->p.of, dual);
-    const mpc_real net_w = asked->net_w;
-    dual->on_g = NEVER_G;
+    const mpc_real net_w = part->net_w;
+    mpc_real least_g = NEVER_G;
     for (int32_t i = 0; i < MPC_LINE_PIECES; i++) {
         const mpc_real slope = mpc_par.line_slope[i];
-        const mpc_real begin = real_max(mpc_par.line_begin_w[i], asked->low_w);
-        const mpc_real end = real_min(mpc_par.line_end_w[i], asked->high_w);
+        const mpc_real begin = real_max(mpc_par.line_begin_w[i], part->low_w);
+        const mpc_real end = real_min(mpc_par.line_end_w[i], part->high_w);
         const mpc_real ratio = ratio_at(&price, slope);
         const mpc_real inverse = REAL(1.0) / ratio;
         const mpc_real quarter = quarter_w((ratio > REAL(1.0)) ? 1 : 0);
@@ -210,10 +173,10 @@ void mpc_costate_minimise_exactly(mpc_stage *stage, int32_t which)
         const mpc_real internal = internal_w(net_w - power_w);
         const mpc_real cost = (price.fuel * fuel) + (price.power * power_w)
                               + (price.internal * internal);
-        const int32_t is_better = ((begin <= end) ? 1 : 0) & ((cost < dual->on_g) ? 1 : 0);
-        dual->on.power_w = pick(is_better, power_w, dual->on.power_w);
-        dual->on.fuel_g_per_s = pick(is_better, fuel, dual->on.fuel_g_per_s);
-        dual->on.internal_w = pick(is_better, internal, dual->on.internal_w);
-        dual->on_g = pick(is_better, cost, dual->on_g);
-    }
+        const int32_t is_better = ((begin <= end) ? 1 : 0) & ((cost < least_g) ? 1 : 0);
+        on->power_w = pick(is_better, power_w, on->power_w);
+        on->fuel_g_per_s = pick(is_better, fuel, on->fuel_g_per_s);
+        on->internal_w = pick(is_better, internal, on->internal_w);
+        least_g = pick(is_better, cost, least_g);
+    }    dual->on_g[MPC_FREE] = least_g;
 }

@@ -33,6 +33,21 @@ static const mpc_real factor[BITS][2] = {{REAL(1.0), REAL(0.5)},
                                          {REAL(1.0), REAL(2.3283064365386963e-10)},
                                          {REAL(1.0), REAL(5.421010862427522e-20)}};
 
+/* 2^-n, n below 16, and 2^-16n */
+static const mpc_real fine[16] = {
+    REAL(1.0),          REAL(0.5),           REAL(0.25),           REAL(0.125),
+    REAL(0.0625),       REAL(0.03125),       REAL(0.015625),       REAL(0.0078125),
+    REAL(0.00390625),   REAL(0.001953125),   REAL(0.0009765625),   REAL(0.00048828125),
+    REAL(0.000244140625), REAL(0.0001220703125), REAL(0.00006103515625), REAL(0.000030517578125)};
+static const mpc_real coarse[8] = {REAL(1.0),
+                                   REAL(1.52587890625e-5),
+                                   REAL(2.3283064365386963e-10),
+                                   REAL(3.552713678800501e-15),
+                                   REAL(5.421010862427522e-20),
+                                   REAL(8.271806125530277e-25),
+                                   REAL(1.262177448353619e-29),
+                                   REAL(1.925929944387236e-34)};
+
 /* exp(x) = (1 + rest) scale */
 typedef struct {
     mpc_real rest;
@@ -46,14 +61,9 @@ static exponential exponential_of(mpc_real x)
     const int32_t count = (int32_t)halvings;
     const mpc_real whole = (mpc_real)count;
     const mpc_real r = (clipped + (whole * LN2_HIGH)) + (whole * LN2_LOW);
-    exponential found = {REAL(0.0), REAL(1.0)};
+    exponential found = {REAL(0.0), fine[count % 16] * coarse[(count / 16) % 8]};
     for (int32_t i = EXP_TERMS; i > 0; i--) {
         found.rest = (r * (REAL(1.0) + found.rest)) / (mpc_real)i;
-    }
-    int32_t left = count;
-    for (int32_t j = 0; j < BITS; j++) {
-        found.scale *= factor[j][left % 2];
-        left /= 2;
     }
     return found;
 }
@@ -91,4 +101,13 @@ mpc_real mpc_fixed_log1p(mpc_real x)
         sum = (sum * square) + (REAL(1.0) / (mpc_real)odd);
     }
     return (((mpc_real)n * LN2) + LN_ROOT2) + (REAL(2.0) * t * sum);
+}
+
+/* x^y for x and y of 0 or more, by the logarithm of x or 1 / x */
+mpc_real mpc_fixed_pow(mpc_real x, mpc_real y)
+{
+    const mpc_real inverse = REAL(1.0) / real_max(x, REAL(1.0) / LARGEST);
+    const mpc_real larger = real_max(x, inverse);
+    const mpc_real below = mpc_fixed_exp(-y * mpc_fixed_log1p(larger - REAL(1.0)));
+    return (x > REAL(1.0)) ? (REAL(1.0) / below) : below;
 }

@@ -8,5 +8,6 @@
 mpc_real mpc_fixed_exp(mpc_real x);
 mpc_real mpc_fixed_expm1(mpc_real x);
 mpc_real mpc_fixed_log1p(mpc_real x);
+mpc_real mpc_fixed_pow(mpc_real x, mpc_real y);
 
 #endif

@@ -17,13 +17,11 @@
 
 #if MPC_F32
 #define REAL_SQRT(x) sqrtf(x)
-#define REAL_POW(x, y) powf((x), (y))
 #define REAL_ABS(x) fabsf(x)
 #define REAL_FMIN(a, b) fminf((a), (b))
 #define REAL_FMAX(a, b) fmaxf((a), (b))
 #else
 #define REAL_SQRT(x) sqrt(x)
-#define REAL_POW(x, y) pow((x), (y))
 #define REAL_ABS(x) fabs(x)
 #define REAL_FMIN(a, b) fmin((a), (b))
 #define REAL_FMAX(a, b) fmax((a), (b))
@@ -34,14 +32,17 @@
 #define REAL_EXP(x) mpc_fixed_exp(x)
 #define REAL_EXPM1(x) mpc_fixed_expm1(x)
 #define REAL_LOG1P(x) mpc_fixed_log1p(x)
+#define REAL_POW(x, y) mpc_fixed_pow((x), (y))
 #elif MPC_F32
 #define REAL_EXP(x) expf(x)
 #define REAL_EXPM1(x) expm1f(x)
 #define REAL_LOG1P(x) log1pf(x)
+#define REAL_POW(x, y) powf((x), (y))
 #else
 #define REAL_EXP(x) exp(x)
 #define REAL_EXPM1(x) expm1(x)
 #define REAL_LOG1P(x) log1p(x)
+#define REAL_POW(x, y) pow((x), (y))
 #endif
 
 /* Without branches, so that time does not depend on data. With a NaN first and a number second the
