@@ -97,7 +97,7 @@ typedef struct {
     mpc_real x[MPC_VARS];     /* SOC and coolant temperature from the origin */
     mpc_real y[MPC_ROWS];     /* multipliers of the SOC and the coolant limits */
     mpc_real goal_charge;     /* aim of a round */
-    mpc_real goal_heat;
+    mpc_real given_heat;      /* multiplier of a coolant limit that is given up, else 0 */
 } mpc_stage;
 
 /* The search. */

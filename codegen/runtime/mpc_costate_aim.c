@@ -64,49 +64,61 @@ static void aim_charge(mpc_state *state)
     }
 }
 
-/* Multiplier of a coolant limit that is given up; 0 where none is. */
-static mpc_real given_up(const mpc_stage *stage, const mpc_costate_dual *dual)
-{
-    const mpc_real most = AT_SLACK * mpc_par.slack_g_per_k;
-    const mpc_real is_cold = not_below(dual->heat, most) * above(stage->p.of.t_low, dual->t_cl_k);
-    const mpc_real is_hot = not_below(-most, dual->heat) * above(dual->t_cl_k, stage->p.of.t_high);
-    return mpc_par.slack_g_per_k * (is_cold - is_hot);
-}
-
 static void aim_heat(mpc_state *state)
 {
     const int32_t which = state->search.here;
     mpc_costate_term *const term = state->search.term;
     const mpc_real slack = mpc_par.slack_g_per_k;
+    const mpc_real most = AT_SLACK * slack;
     mpc_real change = REAL(0.0); /* M of the limits given up less that of the multipliers now */
     for (int32_t k = MPC_STAGES - 1; k >= 0; k--) {
         mpc_stage *const stage = &state->stage[k];
         const mpc_costate_program *const p = &stage->p;
         const mpc_costate_dual *const dual = &stage->dual[which];
-        const mpc_real own = given_up(stage, dual);
+        const mpc_real low = p->of.t_low - dual->t_cl_k;
+        const mpc_real high = p->of.t_high - dual->t_cl_k;
+        /* a limit that is given up */
+        const mpc_real is_cold = not_below(dual->heat, most) * above(low, REAL(0.0));
+        const mpc_real is_hot = not_below(-most, dual->heat) * above(REAL(0.0), high);
+        const mpc_real given = slack * (is_cold - is_hot);
         const mpc_real more = dual->cross * (stage->goal_charge - dual->charge);
-        stage->goal_heat = own;
-        change += own - dual->heat;
+        stage->given_heat = given;
+        change += given - dual->heat;
         term[k].response = (dual->of_heat + p->least_of_heat) * p->per_end * p->per_end;
         term[k].offset = (more * p->per_end) + (term[k].response * change);
-        term[k].limit[0] = (p->of.t_low - dual->t_cl_k) - (NO_LIMIT * above(own, REAL(0.0)));
-        term[k].limit[1] = (p->of.t_high - dual->t_cl_k) + (NO_LIMIT * above(REAL(0.0), own));
+        term[k].limit[0] = low - (NO_LIMIT * is_cold);
+        term[k].limit[1] = high + (NO_LIMIT * is_hot);
         term[k].decay = p->decay;
         term[k].price = MPC_NO_PRICE;
         change *= p->decay;
     }
     mpc_costate_funnel_decaying(&state->search, MPC_STAGES, (HEAT_HALF_STEPS * MPC_STAGES) / 2);
+}
+
+/* The point to try, with multipliers of the right sign: so far on the way to the aim, or beyond. */
+static void go_towards(mpc_state *state, int32_t tried)
+{
+    const mpc_costate_term *const term = state->search.term;
+    const mpc_real share = state->search.share;
+    const mpc_real slack = mpc_par.slack_g_per_k;
     mpc_real after = REAL(0.0); /* price of the next stage, times its decay */
     for (int32_t k = MPC_STAGES - 1; k >= 0; k--) {
         mpc_stage *const stage = &state->stage[k];
+        const mpc_costate_dual *const here = &stage->dual[1 - tried];
+        mpc_costate_dual *const there = &stage->dual[tried];
         const mpc_real jump = term[k].price - after;
-        stage->goal_heat = real_clip(jump + stage->goal_heat, -slack, slack);
+        const mpc_real goal = real_clip(jump + stage->given_heat, -slack, slack);
+        const mpc_real heat = here->heat + (share * (goal - here->heat));
+        const mpc_real charge = here->charge + (share * (stage->goal_charge - here->charge));
+        there->heat = real_clip(heat, -slack, slack);
+        there->charge = real_max(charge, REAL(0.0));
         after = term[k].price * stage->p.decay;
     }
 }
 
-void mpc_costate_aim(mpc_state *state)
+void mpc_costate_try(mpc_state *state, int32_t tried)
 {
     aim_charge(state);
     aim_heat(state);
+    go_towards(state, tried);
 }

@@ -5,12 +5,6 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-/* A choice without a branch. */
-static inline mpc_real pick(int32_t condition, mpc_real yes, mpc_real no)
-{
-    return (condition != 0) ? yes : no;
-}
-
 /* mpc_costate_program.c */
 void mpc_costate_program_fill(mpc_state *state);
 
@@ -29,8 +23,8 @@ void mpc_costate_funnel_decaying(mpc_search *search, int32_t count, int32_t step
 /* mpc_costate_dual.c: evaluate the dual `which` at its multipliers */
 void mpc_costate_dual_at(mpc_state *state, int32_t which);
 
-/* mpc_costate_aim.c */
-void mpc_costate_aim(mpc_state *state);
+/* mpc_costate_aim.c: multipliers on the way to the aim, into the dual `tried` */
+void mpc_costate_try(mpc_state *state, int32_t tried);
 
 /* mpc_costate_path.c: on or off at least cost; the shares of the seconds ahead in x; returns the
  * least of the Lagrangian's stages */

@@ -35,30 +35,12 @@ void mpc_method_start(mpc_state *state)
     mpc_costate_dual_at(state, 0);
 }
 
-/* The point to try, with multipliers of the right sign. */
-static void go_towards_aim(mpc_state *state, int32_t tried)
-{
-    const mpc_search *const search = &state->search;
-    const mpc_real slack = mpc_par.slack_g_per_k;
-    for (int32_t k = 0; k < MPC_STAGES; k++) {
-        mpc_stage *const stage = &state->stage[k];
-        const mpc_costate_dual *const here = &stage->dual[search->here];
-        mpc_costate_dual *const there = &stage->dual[tried];
-        const mpc_real charge = here->charge
-                                + (search->share * (stage->goal_charge - here->charge));
-        const mpc_real heat = here->heat + (search->share * (stage->goal_heat - here->heat));
-        there->charge = real_max(charge, REAL(0.0));
-        there->heat = real_clip(heat, -slack, slack);
-    }
-}
-
 int32_t mpc_method_iterate(mpc_state *state, int32_t count)
 {
     mpc_search *const search = &state->search;
     for (int32_t n = 0; n < count; n++) {
         const int32_t tried = 1 - search->here;
-        mpc_costate_aim(state);
-        go_towards_aim(state, tried);
+        mpc_costate_try(state, tried);
         mpc_costate_dual_at(state, tried);
         const mpc_real rise = search->value[tried] - search->value[search->here];
         const int32_t rises = (rise > LEAST_RISE_G) ? 1 : 0;

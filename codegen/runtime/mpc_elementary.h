@@ -1,12 +1,59 @@
-/* Elementary functions of a fixed amount of work, whatever their argument. */
+/* Elementary functions of a fixed amount of work, whatever their argument. The end of mpc_real.h. */
 #ifndef MPC_ELEMENTARY_H
 #define MPC_ELEMENTARY_H
 
 #include "mpc_config.h"
 
-/* exp(x) and exp(x) - 1 of x <= 0, and log(1 + x) of x >= 0. */
-mpc_real mpc_fixed_exp(mpc_real x);
-mpc_real mpc_fixed_expm1(mpc_real x);
+#if MPC_F32
+#define MPC_EXP_LOWEST REAL(-80.0)
+#define MPC_EXP_TERMS 8
+#else
+#define MPC_EXP_LOWEST REAL(-87.0)
+#define MPC_EXP_TERMS 14
+#endif
+#define MPC_LOG2E REAL(1.4426950408889634)
+#define MPC_LN2_HIGH REAL(0.693145751953125) /* short: products with whole numbers are exact */
+#define MPC_LN2_LOW REAL(1.4286068203094172e-6)
+
+/* 2^-n, n below 16, and 2^-16n: read, not chosen, which is the same work */
+extern const mpc_real mpc_fixed_fine[16];
+extern const mpc_real mpc_fixed_coarse[8];
+
+/* exp(x) = (1 + rest) scale */
+typedef struct {
+    mpc_real rest;
+    mpc_real scale;
+} mpc_exponential;
+
+static inline mpc_exponential exponential_of(mpc_real x)
+{
+    const mpc_real clipped = real_clip(x, MPC_EXP_LOWEST, REAL(0.0));
+    const mpc_real halvings = REAL(0.5) - (clipped * MPC_LOG2E);
+    const int32_t count = (int32_t)halvings;
+    const mpc_real whole = (mpc_real)count;
+    const mpc_real r = (clipped + (whole * MPC_LN2_HIGH)) + (whole * MPC_LN2_LOW);
+    mpc_exponential found = {REAL(0.0),
+                             mpc_fixed_fine[count % 16] * mpc_fixed_coarse[(count / 16) % 8]};
+    for (int32_t i = MPC_EXP_TERMS; i > 0; i--) {
+        found.rest = (r * (REAL(1.0) + found.rest)) / (mpc_real)i;
+    }
+    return found;
+}
+
+/* exp(x) and exp(x) - 1 of x <= 0, here because both are asked of one x */
+static inline mpc_real mpc_fixed_exp(mpc_real x)
+{
+    const mpc_exponential of = exponential_of(x);
+    return of.scale + (of.scale * of.rest);
+}
+
+static inline mpc_real mpc_fixed_expm1(mpc_real x)
+{
+    const mpc_exponential of = exponential_of(x);
+    return (of.scale - REAL(1.0)) + (of.scale * of.rest);
+}
+
+/* log(1 + x) of x >= 0, and x^y of x and y >= 0 */
 mpc_real mpc_fixed_log1p(mpc_real x);
 mpc_real mpc_fixed_pow(mpc_real x, mpc_real y);
 

@@ -51,20 +51,23 @@ void mpc_iterate_shift(mpc_state *state, int32_t by)
 #endif
 }
 
-/* False for NaN. */
+/* False for NaN: 0 times that, or times infinity, is not 0. */
 static int32_t all_below(const mpc_state *state, mpc_real limit)
 {
-    int32_t fine = 1;
+    mpc_real most = REAL(0.0);
+    mpc_real nil = REAL(0.0);
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         const mpc_stage *const stage = &state->stage[k];
         for (int32_t i = 0; i < MPC_VARS; i++) {
-            fine &= (REAL_ABS(stage->x[i]) < limit) ? 1 : 0;
+            most = real_max(REAL_ABS(stage->x[i]), most);
+            nil += REAL(0.0) * stage->x[i];
         }
         for (int32_t i = 0; i < MPC_ROWS; i++) {
-            fine &= (REAL_ABS(stage->y[i]) < limit) ? 1 : 0;
+            most = real_max(REAL_ABS(stage->y[i]), most);
+            nil += REAL(0.0) * stage->y[i];
         }
     }
-    return fine;
+    return within(nil, REAL(0.0), REAL(0.0)) & ((most < limit) ? 1 : 0);
 }
 
 /* Remember the iterate, in SI units, in case the solve that starts from it fails. */

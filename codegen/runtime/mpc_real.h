@@ -6,11 +6,8 @@
 #include <stdint.h>
 
 #include "mpc_config.h"
-#if MPC_COSTATE
-#include "mpc_elementary.h"
-#if defined(__SSE2__)
+#if MPC_COSTATE && defined(__SSE2__)
 #include <emmintrin.h>
-#endif
 #endif
 
 #define REAL(literal) ((mpc_real)(literal))
@@ -95,5 +92,15 @@ static inline mpc_real real_clip(mpc_real x, mpc_real low, mpc_real high)
 {
     return real_min(real_max(x, low), high);
 }
+
+/* A choice without a branch. */
+static inline mpc_real pick(int32_t condition, mpc_real yes, mpc_real no)
+{
+    return (condition != 0) ? yes : no;
+}
+
+#if MPC_COSTATE
+#include "mpc_elementary.h"
+#endif
 
 #endif
