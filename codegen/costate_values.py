@@ -124,7 +124,7 @@ def costate_values_of(
 
 
 def _for_bisection(envelope: Curves, stride: int) -> Floats:
-    """Slope, end, begin and intercept of as many pieces as halvings from that stride can tell apart.
+    """Slope, end, begin, intercept of as many pieces as halvings from this stride tell apart.
 
     Nothing lies beyond the end of the last piece, or of those after it, which are none.
     """

@@ -34,7 +34,7 @@ MEMORY_KB: dict[tuple[Algorithm, Precision], tuple[int, int]] = {
     ("osqp", "f32"): (512, 384),
     ("osqp", "f64"): (512, 768),
     ("costate", "f32"): (64, 64),
-    ("costate", "f64"): (64, 96),
+    ("costate", "f64"): (64, 112),
 }
 
 # Files of the runtime that one method alone has; those of costates by their beginnings.

@@ -30,10 +30,10 @@ typedef struct {
     mpc_real least_of_heat;
     mpc_costate_part part[MPC_PARTS];
     mpc_real off_charge; /* SOC that the free seconds take with the engine off */
-    mpc_real width;     /* cost over which on and off are smoothed, g */
-    mpc_real per_width; /* 1 / width */
-    mpc_real must;   /* 1 where the engine has to run all the time, else 0 */
-    mpc_real cannot; /* 1 where it must not, else 0 */
+    mpc_real width;      /* cost over which on and off are smoothed, g */
+    mpc_real per_width;  /* 1 / width */
+    mpc_real must;       /* 1 where the engine has to run all the time, else 0 */
+    mpc_real cannot;     /* 1 where it must not, else 0 */
 #if MPC_STARTS
     mpc_real rises; /* of the on-share */
 #endif
@@ -55,8 +55,8 @@ typedef struct {
     mpc_real t_cl_k;
     mpc_real of_charge; /* derivatives of the change of SOC to lambda, of that to nu, */
     mpc_real cross;
-    mpc_real of_heat; /* of the coolant's heat to nu */
-    mpc_real share;   /* sigma */
+    mpc_real of_heat;           /* of the coolant's heat to nu */
+    mpc_real share;             /* sigma */
     mpc_drive drive[MPC_PARTS]; /* while on */
     mpc_real on_g[MPC_PARTS];   /* cost of the parts with the engine on, */
     mpc_real off_g;             /* of the free one with it off, and of a start */
@@ -92,12 +92,12 @@ typedef struct {
 typedef struct {
     mpc_stage_road road;
     mpc_costate_program p;
-    mpc_costate_dual dual[2]; /* where the search is, and what it tries */
+    mpc_costate_dual dual[2];             /* where the search is, and what it tries */
     mpc_costate_answer answer[MPC_PARTS]; /* on the way */
-    mpc_real x[MPC_VARS];     /* SOC and coolant temperature from the origin */
-    mpc_real y[MPC_ROWS];     /* multipliers of the SOC and the coolant limits */
-    mpc_real goal_charge;     /* aim of a round */
-    mpc_real given_heat;      /* multiplier of a coolant limit that is given up, else 0 */
+    mpc_real x[MPC_VARS];                 /* SOC and coolant temperature from the origin */
+    mpc_real y[MPC_ROWS];                 /* multipliers of the SOC and the coolant limits */
+    mpc_real goal_charge;                 /* aim of a round */
+    mpc_real given_heat; /* multiplier of a coolant limit that is given up, else 0 */
 } mpc_stage;
 
 /* The search. */

@@ -24,9 +24,9 @@ static inline mpc_real surely_above(mpc_real a, mpc_real b)
  * is met the walk ends. */
 static void put_end(mpc_costate_term *end)
 {
-    const mpc_costate_term zero = {REAL(0.0),         ENDLESS_RESPONSE,
-                                   {REAL(0.0), REAL(0.0)}, {REAL(0.0), REAL(0.0)},
-                                   REAL(1.0),         REAL(0.0)};
+    const mpc_costate_term zero = {
+        REAL(0.0), ENDLESS_RESPONSE, {REAL(0.0), REAL(0.0)}, {REAL(0.0), REAL(0.0)},
+        REAL(1.0), REAL(0.0)};
     *end = zero;
 }
 

@@ -39,7 +39,8 @@ static mpc_real follow(mpc_state *state, mpc_real soc_price)
         const mpc_real off = (free - chosen) * stage->road.free_internal_off_w;
         const mpc_real fuel = (chosen * drive[MPC_FREE].fuel_g_per_s)
                               + (forced * drive[MPC_FORCED].fuel_g_per_s);
-        const mpc_real power = (chosen * drive[MPC_FREE].power_w) + (forced * drive[MPC_FORCED].power_w);
+        const mpc_real power = (chosen * drive[MPC_FREE].power_w)
+                               + (forced * drive[MPC_FORCED].power_w);
         const mpc_real internal = (chosen * drive[MPC_FREE].internal_w)
                                   + (forced * drive[MPC_FORCED].internal_w) + off;
         mpc_real heat = (of->per_fuel * fuel) - (of->per_power * power);

@@ -25,8 +25,8 @@ static void put_part(mpc_costate_part *part, mpc_real net_w, mpc_real low_w, mpc
 /* A second has no part without a choice: what would be evaluated of it is nil for good. */
 static void put_no_part(mpc_stage *stage)
 {
-    static const mpc_costate_answer nothing = {{REAL(0.0), REAL(0.0), REAL(0.0)},
-                                               REAL(0.0), REAL(0.0)};
+    static const mpc_costate_answer nothing = {
+        {REAL(0.0), REAL(0.0), REAL(0.0)}, REAL(0.0), REAL(0.0)};
     static const mpc_drive idle = {REAL(0.0), REAL(0.0), REAL(0.0)};
     stage->answer[MPC_FORCED] = nothing;
     for (int32_t i = 0; i < 2; i++) {

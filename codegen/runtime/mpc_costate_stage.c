@@ -142,9 +142,9 @@ void mpc_costate_minimise(mpc_state *state, int32_t which)
             answer->to_prices.cross = by_charge * v_heat;
             answer->to_prices.heat = gives * v_heat * v_heat;
             answer->charge = part->share * of->charge_per_w * on.drive.internal_w;
-            answer->heat = part->share
-                           * ((of->per_fuel * on.drive.fuel_g_per_s)
-                              - (of->per_power * on.drive.power_w));
+            answer->heat =
+                part->share
+                * ((of->per_fuel * on.drive.fuel_g_per_s) - (of->per_power * on.drive.power_w));
             dual->drive[i] = on.drive;
             dual->on_g[i] = part->share * on.cost;
         }
@@ -178,5 +178,6 @@ void mpc_costate_minimise_exactly(mpc_stage *stage, int32_t which)
         on->fuel_g_per_s = pick(is_better, fuel, on->fuel_g_per_s);
         on->internal_w = pick(is_better, internal, on->internal_w);
         least_g = pick(is_better, cost, least_g);
-    }    dual->on_g[MPC_FREE] = least_g;
+    }
+    dual->on_g[MPC_FREE] = least_g;
 }

@@ -235,9 +235,7 @@ def dual(program: Program, at: Multipliers) -> Dual:
     )
 
 
-def _start_prices(
-    program: Program, width: Floats, difference: Floats, price: Floats
-) -> Floats:
+def _start_prices(program: Program, width: Floats, difference: Floats, price: Floats) -> Floats:
     """Prices e_k of sigma_k - sigma_k-1, shape (n,), each between 0 and `price`.
 
     sigma_k = 1/2 - (J_on - J_off + e_k - e_k+1) / W_k. The seconds ahead are a chain, and so are
