@@ -94,13 +94,14 @@ static void price_starts_ahead(mpc_state *state, int32_t which)
  * limit, or of none. */
 static void price_starts_of_block(const mpc_stage *block, int32_t which, mpc_costate_term *term)
 {
-    const mpc_costate_dual *const dual[3] = {&block[0].dual[which], &block[1].dual[which],
-                                             &block[2].dual[which]};
-    const mpc_real one = start_price(&block[1], dual[1]);
-    const mpc_real two = start_price(&block[2], dual[2]);
-    const mpc_real first_g = difference_g(&block[0].p, dual[0], REAL(0.0), one);
-    const mpc_real middle_g = difference_g(&block[1].p, dual[1], one, two);
-    const mpc_real last_g = difference_g(&block[2].p, dual[2], two, REAL(0.0));
+    const mpc_costate_dual *const first = &block[0].dual[which];
+    const mpc_costate_dual *const middle = &block[1].dual[which];
+    const mpc_costate_dual *const last = &block[2].dual[which];
+    const mpc_real one = start_price(&block[1], middle);
+    const mpc_real two = start_price(&block[2], last);
+    const mpc_real first_g = difference_g(&block[0].p, first, REAL(0.0), one);
+    const mpc_real middle_g = difference_g(&block[1].p, middle, one, two);
+    const mpc_real last_g = difference_g(&block[2].p, last, two, REAL(0.0));
     const mpc_real w_first = block[0].p.width;
     const mpc_real w_middle = block[1].p.width;
     const mpc_real w_last = block[2].p.width;

@@ -15,15 +15,6 @@
 #define LN_ROOT2 REAL(0.34657359027997264)
 #define ROOT2 REAL(1.4142135623730951)
 
-/* 2^-1, 2^-2, 2^-4 and so on */
-static const mpc_real factor[BITS] = {REAL(0.5),
-                                      REAL(0.25),
-                                      REAL(0.0625),
-                                      REAL(0.00390625),
-                                      REAL(1.52587890625e-5),
-                                      REAL(2.3283064365386963e-10),
-                                      REAL(5.421010862427522e-20)};
-
 /* 2^-n, n below 16, and 2^-16n */
 const mpc_real mpc_fixed_fine[16] = {REAL(1.0),
                                      REAL(0.5),
@@ -54,6 +45,14 @@ const mpc_real mpc_fixed_coarse[8] = {REAL(1.0),
  * n ln 2 + ln(sqrt 2) + 2 (t + t^3 / 3 + t^5 / 5 + ..) */
 mpc_real mpc_fixed_log1p(mpc_real x)
 {
+    /* 2^-1, 2^-2, 2^-4 and so on */
+    static const mpc_real factor[BITS] = {REAL(0.5),
+                                          REAL(0.25),
+                                          REAL(0.0625),
+                                          REAL(0.00390625),
+                                          REAL(1.52587890625e-5),
+                                          REAL(2.3283064365386963e-10),
+                                          REAL(5.421010862427522e-20)};
     mpc_real m = REAL(1.0) + real_clip(x, REAL(0.0), LARGEST);
     mpc_real n = REAL(0.0);
     mpc_real power = REAL(64.0);

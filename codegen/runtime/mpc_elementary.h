@@ -1,7 +1,8 @@
-/* Elementary functions of a fixed amount of work, whatever their argument. The end of mpc_real.h. */
+/* Elementary functions of a fixed amount of work, whatever their argument. */
 #ifndef MPC_ELEMENTARY_H
 #define MPC_ELEMENTARY_H
 
+#include "mpc_arithmetic.h"
 #include "mpc_config.h"
 
 #if MPC_F32
@@ -29,11 +30,11 @@ static inline mpc_exponential exponential_of(mpc_real x)
 {
     const mpc_real clipped = real_clip(x, MPC_EXP_LOWEST, REAL(0.0));
     const mpc_real halvings = REAL(0.5) - (clipped * MPC_LOG2E);
-    const int32_t count = (int32_t)halvings;
-    const mpc_real whole = (mpc_real)count;
+    const int32_t times = (int32_t)halvings;
+    const mpc_real whole = (mpc_real)times;
     const mpc_real r = (clipped + (whole * MPC_LN2_HIGH)) + (whole * MPC_LN2_LOW);
     mpc_exponential found = {REAL(0.0),
-                             mpc_fixed_fine[count % 16] * mpc_fixed_coarse[(count / 16) % 8]};
+                             mpc_fixed_fine[times % 16] * mpc_fixed_coarse[(times / 16) % 8]};
     for (int32_t i = MPC_EXP_TERMS; i > 0; i--) {
         found.rest = (r * (REAL(1.0) + found.rest)) / (mpc_real)i;
     }

@@ -75,7 +75,7 @@ def test_c_has_the_value_of_the_formula_to_the_last_bit() -> None:
     writer = Writer({name: f"x[{i}]" for i, name in enumerate("abc")}, FUNCTIONS)
     lines = [f"y[{i}] = {writer.expression(expression(text))};" for i, text in enumerate(texts)]
     project = project_files(values(), "host", "f64")
-    files = {name: project[name] for name in ("mpc_config.h", "mpc_real.h")}
+    files = {name: project[name] for name in ("mpc_config.h", "mpc_arithmetic.h", "mpc_real.h")}
     body = "\n".join(lines)
     files["formulas.c"] = (
         f'#include "mpc_real.h"\nvoid evaluate(const mpc_real *x, mpc_real *y)\n{{\n{body}\n}}\n'
