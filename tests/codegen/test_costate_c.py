@@ -123,6 +123,18 @@ def test_the_funnel_takes_the_steps_of_python(library, data):
     np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8)
 
 
+@pytest.mark.parametrize("precision", ["f64", "f32"])
+def test_its_powers_are_those_of_numpy(road, precision):
+    """To round-off times the logarithm of the result."""
+    made = GeneratedCostate(Trip(road, "paper-nimh"), None, precision).library
+    function, real = made.functions.mpc_fixed_pow, made.real
+    function.argtypes, function.restype = [real, real], real
+    relative = 64.0 * float(np.finfo(real).eps)
+    for x in (0.0, 1e-12, 1e-3, 0.3, 0.999, 1.0, 1.001, 1.7, 40.0):
+        for y in (0.5, 1.0, 1.35, 3.0):
+            assert function(x, y) == pytest.approx(x**y, rel=relative, abs=1e-15)
+
+
 def test_two_controllers_side_by_side_decide_as_alone(road):
     trip = Trip(road, "paper-nimh")
     alone = drive(trip, GeneratedCostate(trip)).trajectory.p_eng_w

@@ -6,7 +6,8 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from small_program import program
 
-from qpmpc.costate.dual import Multipliers, dual
+from qpmpc.costate.dual import Multipliers, _of_blocks, dual
+from qpmpc.costate.funnel import funnel
 from qpmpc.costate.solve import newton
 
 MOST = 3e3
@@ -78,3 +79,19 @@ def test_newton_finds_its_top(car, step, soc, t_cl, on):
     few = top(60.0, 60), top(300.0, 60)
     if few[0] != pytest.approx(few[1], abs=0.02):
         assert top(60.0, 1000) == pytest.approx(top(300.0, 1000), abs=0.02)
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.integers(0, 10**6))
+def test_the_starts_of_a_block_in_closed_form_are_those_of_a_walk(seed):
+    """Demand that rises and that falls into a class, narrow and wide switches, ends of limits."""
+    rng = np.random.default_rng(seed)
+    width = rng.uniform(1e-4, 1.0, 3)
+    difference = rng.normal(0.0, 1.0, 3) * rng.choice([0.1, 1.0, 10.0])
+    price = np.append(0.0, rng.normal(0.0, 1.0, 2) * (rng.random(2) < 0.8))
+    low, high = np.minimum(price, 0.0), np.maximum(price, 0.0)
+    edge = _of_blocks(width[None], difference[None], low[None], high[None])
+    after_low, after_high = np.append(low[1:], 0.0), np.append(high[1:], 0.0)
+    share = funnel(difference - 0.5 * width, width, after_low, after_high, steps=30)
+    found = 0.5 - (difference + edge - np.append(edge[1:], 0.0)) / width
+    np.testing.assert_allclose(found, share, rtol=1e-6, atol=1e-6 / width.min())
