@@ -72,11 +72,12 @@ mpc_real mpc_fixed_log1p(mpc_real x)
     return ((n * LN2) + LN_ROOT2) + (REAL(2.0) * t * sum);
 }
 
-/* x^y for x and y of 0 or more, by the logarithm of x or 1 / x */
+/* x^y for x of 0 or more and y above 0, by the logarithm of x or 1 / x */
 mpc_real mpc_fixed_pow(mpc_real x, mpc_real y)
 {
     const mpc_real inverse = REAL(1.0) / real_max(x, REAL(1.0) / LARGEST);
     const mpc_real larger = real_max(x, inverse);
     const mpc_real below = mpc_fixed_exp(-y * mpc_fixed_log1p(larger - REAL(1.0)));
-    return (x > REAL(1.0)) ? (REAL(1.0) / below) : below;
+    const mpc_real power = pick((x > REAL(1.0)) ? 1 : 0, REAL(1.0) / below, below);
+    return above(x, REAL(0.0)) * power;
 }

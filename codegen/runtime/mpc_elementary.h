@@ -54,7 +54,7 @@ static inline mpc_real mpc_fixed_expm1(mpc_real x)
     return (of.scale - REAL(1.0)) + (of.scale * of.rest);
 }
 
-/* log(1 + x) of x >= 0, and x^y of x and y >= 0 */
+/* log(1 + x) of x >= 0, and x^y of x >= 0 and y > 0 */
 mpc_real mpc_fixed_log1p(mpc_real x);
 mpc_real mpc_fixed_pow(mpc_real x, mpc_real y);
 
