@@ -36,6 +36,7 @@ MEMORY_KB: dict[tuple[Algorithm, Precision], tuple[int, int]] = {
     ("costate", "f32"): (64, 64),
     ("costate", "f64"): (64, 112),
 }
+OF_BUDGET = "The sizes are the controller's budget: a build that\n * does not fit fails to link."
 
 # Files of the runtime that one method alone has; those of costates by their beginnings.
 OF_ADMM = {"mpc_admm.c", "mpc_admm.h"}
@@ -110,7 +111,7 @@ def project_files(
     files = _runtime(values, algorithm)
     of_osqp = osqp_files(values, precision) if algorithm == "osqp" else {}
     if target == "cortex-m7":
-        files |= _texts("cortex_m7")
+        files |= texts_of("cortex_m7")
     context = _context(values, target, precision, algorithm)
     templates = {
         "mpc_config.h": "mpc_config.h.j2",
@@ -122,11 +123,11 @@ def project_files(
         "NOTICE": "NOTICE.j2",
     }
     if target == "cortex-m7":
-        templates["cortex_m7.ld"] = "cortex_m7.ld.j2"
+        files["cortex_m7.ld"] = linker_script(algorithm, MEMORY_KB[algorithm, precision])
     context["sources"] = sorted(n for n in [*files, "mpc_data.c"] if n.endswith(".c"))
     context["osqp_sources"] = [name for name in of_osqp if name.endswith(".c")]
     for output, template in templates.items():
-        files[output] = _environment().get_template(template).render(context)
+        files[output] = template_text(template, **context)
     files |= example_files(target)
     return with_prefix(dict(sorted((files | of_osqp).items())), prefix)
 
@@ -149,7 +150,7 @@ def _runtime(values: Values, algorithm: Algorithm) -> dict[str, str]:
         left_out |= OF_ADMM
     if algorithm == "costate":
         left_out |= OF_QP
-    texts = _texts("runtime") | (_texts("osqp_adapter") if algorithm == "osqp" else {})
+    texts = texts_of("runtime") | (texts_of("osqp_adapter") if algorithm == "osqp" else {})
     is_costate = algorithm == "costate"
     files = {
         name: text
@@ -177,7 +178,7 @@ def one_of(name: str, names: tuple[Name, ...], what: str) -> Name:
 
 
 @cache
-def _texts(folder: str) -> dict[str, str]:
+def texts_of(folder: str) -> dict[str, str]:
     """Return the files of a folder of this package, by name; not to be changed."""
     inner = (resources.files("qpmpc.codegen") / folder).iterdir()
     paths = sorted((path for path in inner if path.is_file()), key=lambda path: path.name)
@@ -188,11 +189,40 @@ def _texts(folder: str) -> dict[str, str]:
 def _environment() -> Environment:
     """Return what compiles the templates, each once."""
     return Environment(
-        loader=FunctionLoader(lambda name: _texts("templates")[name]),
+        loader=FunctionLoader(lambda name: texts_of("templates")[name]),
         undefined=StrictUndefined,
         keep_trailing_newline=True,
         trim_blocks=False,
         autoescape=False,
+    )
+
+
+def literal_of(number: float, precision: Precision) -> str:
+    """Return a number as a constant in C."""
+    return f"{np.float32(number)!s}f" if precision == "f32" else repr(float(number))
+
+
+def literals(array: NDArray[np.float64], precision: Precision) -> list[str]:
+    """Return the numbers of an array as constants in C, some to a line."""
+    texts = [literal_of(x, precision) for x in array.tolist()]
+    cuts = range(0, len(texts), VALUES_A_LINE)
+    return [", ".join(texts[i : i + VALUES_A_LINE]) for i in cuts]
+
+
+def template_text(name: str, **context: Any) -> str:
+    """Return a template of this package, filled in."""
+    return _environment().get_template(name).render(context)
+
+
+def linker_script(algorithm: Algorithm, memory_kb: tuple[int, int], remark: str = OF_BUDGET) -> str:
+    """Return the memory map of a Cortex-M7: flash and RAM in KB, and what to say of them."""
+    arrays = [f"{PREFIX}{name}" for name in CONSTANT_ARRAYS]
+    return template_text(
+        "cortex_m7.ld.j2",
+        algorithm=algorithm,
+        memory_kb=memory_kb,
+        constant_arrays=arrays,
+        remark=remark,
     )
 
 
@@ -204,14 +234,7 @@ def _context(
     values: Values, target: Target, precision: Precision, algorithm: Algorithm
 ) -> dict[str, Any]:
     def literal(number: float) -> str:
-        if precision == "f32":
-            return f"{np.float32(number)!s}f"
-        return repr(float(number))
-
-    def rows(array: NDArray[np.float64]) -> list[str]:
-        texts = [literal(x) for x in array.tolist()]
-        cuts = range(0, len(texts), VALUES_A_LINE)
-        return [", ".join(texts[i : i + VALUES_A_LINE]) for i in cuts]
+        return literal_of(number, precision)
 
     scalars = {name: literal(value) for name, value in values.scalars.items()}
     counts = {name: str(count) for name, count in values.counts.items()}
@@ -223,8 +246,6 @@ def _context(
         "precision": precision,
         "algorithm": algorithm,
         "osqp_version": osqp_version(),
-        "constant_arrays": [f"{PREFIX}{name}" for name in CONSTANT_ARRAYS],
-        "memory_kb": MEMORY_KB[algorithm, precision],
         "values": values,
         "sizes": values.sizes,
         "constants": [
@@ -233,7 +254,7 @@ def _context(
         ],
         "scalars": scalars | counts,
         "counts": counts,
-        "arrays": {name: rows(array) for name, array in values.arrays.items()},
+        "arrays": {name: literals(array, precision) for name, array in values.arrays.items()},
         "fuel_stride": 1 << ((values.sizes.fuel_points - 1).bit_length() - 1),
         "stretch": _STRETCH.get(exponent, power),
     }

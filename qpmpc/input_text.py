@@ -58,7 +58,7 @@ def read_text(path: str | os.PathLike[str], megabytes: int, prefix: str = "") ->
     InputError
         If the name is impossible, or the file cannot be read, is too large, or is not text.
     """
-    text = _decoded(_content(path, megabytes, prefix), "utf-8-sig")
+    text = _decoded(read_bytes(path, megabytes, prefix), "utf-8-sig")
     if text is None:
         raise InputError(f"{prefix}{path}: must be plain text in UTF-8")
     return text
@@ -78,7 +78,7 @@ def read_table_text(path: str | os.PathLike[str], megabytes: int) -> tuple[str, 
     InputError
         As of `read_text`; if it is neither.
     """
-    content = _content(path, megabytes)
+    content = read_bytes(path, megabytes)
     text = _decoded(content, "utf-8-sig")
     if text is not None:
         return text, ""
@@ -88,7 +88,8 @@ def read_table_text(path: str | os.PathLike[str], megabytes: int) -> tuple[str, 
     return text, "the text is not UTF-8: read as Windows-1252"
 
 
-def _content(path: str | os.PathLike[str], megabytes: int, prefix: str = "") -> bytes:
+def read_bytes(path: str | os.PathLike[str], megabytes: int, prefix: str = "") -> bytes:
+    """Read a file of any content; parameters and errors as of `read_text`."""
     check_path(path, prefix)
     limit = megabytes * 1_000_000
     try:

@@ -5,16 +5,14 @@ from typing import Annotated
 
 import typer
 
-CycleArgument = Annotated[
-    str,
-    typer.Argument(
-        metavar="CYCLE",
-        help="A shipped cycle (see [b]qpmpc cycles[/b]), a trip (see [b]qpmpc trips[/b]) or a "
-        "file: CSV with time_s,speed_mps[dim],grade[/dim], or a log with units of its own, GPX, "
-        "MDF.",
-        show_default=False,
-    ),
-]
+CYCLE_ARGUMENT = typer.Argument(
+    metavar="CYCLE",
+    help="A shipped cycle (see [b]qpmpc cycles[/b]), a trip (see [b]qpmpc trips[/b]) or a "
+    "file: CSV with time_s,speed_mps[dim],grade[/dim], or a log with units of its own, GPX, "
+    "MDF.",
+    show_default=False,
+)
+CycleArgument = Annotated[str, CYCLE_ARGUMENT]
 VehicleOption = Annotated[
     str,
     typer.Option(

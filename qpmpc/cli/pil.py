@@ -1,11 +1,11 @@
-"""``qpmpc pil``: the generated firmware drives a cycle, with instructions counted."""
+"""``qpmpc pil``: generated firmware drives a cycle in QEMU, or replays one on a board."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from qpmpc.cli.options import CycleArgument, JsonOption, OutOption, SetOption, VehicleOption
+from qpmpc.cli.options import CYCLE_ARGUMENT, JsonOption, OutOption, SetOption, VehicleOption
 
 if TYPE_CHECKING:
     from qpmpc.codegen.generate import Algorithm, Precision
@@ -15,9 +15,13 @@ if TYPE_CHECKING:
 
 
 def pil(
-    cycle: CycleArgument,
+    context: typer.Context,
+    cycle: Annotated[str | None, CYCLE_ARGUMENT] = None,
     controller: Annotated[str, typer.Option(metavar="NAME", help="mh-qp or mh-costate.")] = "mh-qp",
-    target: Annotated[str, typer.Option(metavar="TARGET", help="cortex-m7.")] = "cortex-m7",
+    target: Annotated[
+        str,
+        typer.Option(metavar="TARGET", help="cortex-m7; with --project linux too."),
+    ] = "cortex-m7",
     precision: Annotated[
         str | None,
         typer.Option(
@@ -36,6 +40,38 @@ def pil(
             "instructions and memory against fuel above DP.",
         ),
     ] = False,
+    project: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="For a board of your own: write a project that replays the cycle and logs each "
+            "second, in place of QEMU.",
+            show_default=False,
+        ),
+    ] = None,
+    seconds: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", help="Of the cycle, for --project; default: all.", show_default=False
+        ),
+    ] = None,
+    from_log: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Read the log of the board that ran --project DIR: check each command, show "
+            "times.",
+            show_default=False,
+        ),
+    ] = None,
+    clock_mhz: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MHZ",
+            help="Clock of the board's core, for --project or --from-log.",
+            show_default=False,
+        ),
+    ] = None,
     vehicle: VehicleOption = "prius-nimh",
     set_: SetOption = None,
     json_file: JsonOption = None,
@@ -47,6 +83,9 @@ def pil(
     compared with the Python controller's in the same state. With --out: steps (CSV), figures
     (JSON), picture (PNG), report (HTML).
 
+    On a board of your own: --project DIR writes a program that replays a recorded trip and prints
+    a log; --from-log FILE reads it. docs/embedded.md has the steps.
+
     For example:
 
       qpmpc pil nycc
@@ -56,8 +95,14 @@ def pil(
       qpmpc pil nycc --controller mh-costate
 
       qpmpc pil nycc --pareto --out results/pil
+
+      qpmpc pil nycc --project my_board --clock-mhz 480
+
+      qpmpc pil --project my_board --from-log board.log
     """
+    from qpmpc.cli import board
     from qpmpc.cli.inputs import check_outputs, load_vehicle_and_settings
+    from qpmpc.codegen.board.project import BOARD_TARGETS
     from qpmpc.codegen.firmware import require_tools
     from qpmpc.codegen.generate import ALGORITHMS, PRECISIONS, one_of
     from qpmpc.codegen.method import GENERATED
@@ -65,15 +110,30 @@ def pil(
     from qpmpc.registry import check_controllers
     from qpmpc.trip import Trip
 
-    one_of(target, ("cortex-m7",), "target")
+    if from_log is not None:
+        if project is None:
+            raise InputError("--from-log needs --project DIR, whose program wrote the log")
+        board.refuse(context, board.OF_PROJECT, "with --from-log, the project has it")
+        board.read(project, from_log, clock_mhz, json_file, out)
+        return
+    if cycle is None:
+        raise InputError("Missing argument 'CYCLE' (see qpmpc pil --help)")
+    of_board = one_of(target, ("cortex-m7",) if project is None else BOARD_TARGETS, "target")
     name = one_of(controller, GENERATED, "generated controller")
     if name != "mh-qp" and (algorithm is not None or pareto):
         option = "--pareto" if pareto else "--algorithm"
         raise InputError(f"{option} is for mh-qp alone, not for {name}: leave it out")
+    if project is None:
+        board.refuse(context, board.OF_BOARD, "without --project or --from-log")
     precisions = PRECISIONS if precision is None else (one_of(precision, PRECISIONS, "precision"),)
     algorithms = ALGORITHMS if algorithm is None else (one_of(algorithm, ALGORITHMS, "algorithm"),)
     car, settings = load_vehicle_and_settings(vehicle, set_)
     trip = Trip(cycle, car)
+    if project is not None:
+        board.refuse(context, ("pareto", "json_file", "out"), "with --project")
+        chosen = (of_board, name, precisions[0], algorithms[0], seconds, clock_mhz)
+        board.make(trip, settings, project, *chosen)
+        return
     check_outputs(json_file, out)
     if pareto:
         check_controllers(["dp"])
