@@ -3,14 +3,18 @@
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from hashlib import sha256
 from importlib import resources
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 from asammdf import MDF, Signal
+from board_log import bodies, line, text_of
 from hypothesis import strategies as st
 
+from qpmpc.codegen.board.log import read_log
+from qpmpc.codegen.board.manifest import Manifest, load_manifest
 from qpmpc.cycles import load_cycle
 from qpmpc.faults.models import load_faults
 from qpmpc.registry import split_settings
@@ -107,6 +111,21 @@ value = 0.05
 kind = "solver-failure"
 at_s = 200
 """
+MANIFEST = Manifest(
+    version="0.1.0",
+    target="linux",
+    controller="mh-qp",
+    algorithm="admm",
+    precision="f32",
+    iterations=30,
+    cycle="nycc",
+    vehicle="prius-nimh",
+    prepared=True,
+    power_max_w=57e3,
+    trip_s=598,
+    seconds=60,
+    files={"mpc.h": sha256(b"").hexdigest()},
+)
 WITH_BASE = "name = 'mine'\nbase = 'prius-nimh'\n[battery]\nsoc_min = 0.45\naux_power_w = 500\n"
 VEHICLE = load_vehicle()
 KEYS = [
@@ -165,6 +184,15 @@ def changed_bytes(draw: st.DrawFn, good: bytes) -> bytes:
     return bytes(content[: draw(st.just(len(good)) | st.integers(0, len(good)))])
 
 
+@st.composite
+def board_logs(draw: st.DrawFn) -> bytes:
+    """A board's log with something done to its lines, before or after their checksums."""
+    content: bytes = draw(edited("\n".join(bodies()), ","))
+    if draw(st.booleans()):
+        return draw(edited(text_of(bodies()), ","))
+    return "".join(line(body) for body in content.decode("latin-1").split("\n")).encode("latin-1")
+
+
 def _load_settings(_: Path, texts: list[str]) -> None:
     of_vehicle, _settings = split_settings(parse_settings(texts))
     VEHICLE.with_settings(of_vehicle)
@@ -178,6 +206,7 @@ def _file(name: str, load: Callable[[Path], object]) -> Callable[[Path, bytes], 
     def loader(folder: Path, content: bytes) -> None:
         path = folder / name
         path.write_bytes(content)
+        (folder / "mpc.h").touch()  # the source of a board's project
         load(path)
 
     return loader
@@ -206,6 +235,11 @@ LOADERS: dict[str, Loader] = {
     "gpx": Loader(edited(GPX, ">") | st.binary(max_size=200), _file("trip.gpx", load_cycle)),
     "mdf": Loader(
         changed_bytes(_measurement()) | st.binary(max_size=200), _file("trip.mf4", load_cycle)
+    ),
+    "board log": Loader(board_logs() | st.binary(max_size=200), _file("board.log", read_log)),
+    "board project": Loader(
+        edited(MANIFEST.text(), "=") | st.binary(max_size=200),
+        _file("replay.toml", lambda path: load_manifest(path.parent)),
     ),
     "engine": Loader(edited(ENGINE, ",") | st.binary(max_size=200), _file("map.csv", _load_map)),
 }

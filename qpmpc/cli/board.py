@@ -26,8 +26,9 @@ OF_BOARD = ("seconds", "clock_mhz")
 def given(context: typer.Context, names: tuple[str, ...]) -> list[str]:
     """Return those of the parameters that the command line names, as options."""
     sources = {name: context.get_parameter_source(name) for name in names}
+    options = {"cycle": "CYCLE", "json_file": "--json", "set_": "--set"}
     return [
-        "CYCLE" if name == "cycle" else f"--{name.strip('_').replace('_', '-')}"
+        options.get(name, f"--{name.replace('_', '-')}")
         for name, source in sources.items()
         if source is not None and source.name == "COMMANDLINE"
     ]

@@ -1,10 +1,12 @@
 """``qpmpc pil``: one run or the Pareto front, what is written, what is refused."""
 
 import json
+import re
 import sys
 from pathlib import Path
 
 import pytest
+from board_log import IDENTITY, bodies, text_of
 
 import qpmpc.codegen.pil.loop as loop
 from qpmpc.codegen import firmware
@@ -86,6 +88,71 @@ def test_without_matplotlib_there_are_figures_but_no_picture(cli, trip, tmp_path
 
 
 @pytest.fixture
+def project(cli, trip, tmp_path) -> Path:
+    """A project for Linux, and a log as its program would write it, but of another machine."""
+    folder = tmp_path / "project"
+    options = ("--target", "linux", "--seconds", "3", "--controller", "mh-costate")
+    done = cli("pil", trip, "--project", folder, *options)
+    assert (done.code, done.err) == (0, "")
+    identity = re.search("identity ([0-9a-f]{16})", done.out)[1]
+    assert f'"{identity}"' in (folder / "replay_identity.h").read_text()
+    lines = bodies(3, unit="ns", hz=0)
+    lines[0] = lines[0].replace(IDENTITY, identity).replace("mh-qp", "mh-costate")
+    off = [body.replace("42c80000,1", "00000000,0") for body in lines]
+    (folder / "board.log").write_text(text_of(off), newline="")
+    return folder
+
+
+def test_a_log_is_shown_and_written(cli, project, tmp_path, strict_json):
+    out = tmp_path / "out"
+    log = project / "board.log"
+    done = cli("pil", "--project", project, "--from-log", log, "--out", out, "--json", "-")
+    assert done.code == 0, done.err
+    data = strict_json(done.out)
+    assert data["times"]["step"]["median"] == 1_800_001
+    assert data["times"]["step"]["median_ms"] == pytest.approx(1.800001)
+    assert data["times"]["step"]["spread_percent"] == pytest.approx(2 / 18000.01)
+    assert data["times"]["both"]["max"] == 1_800_002 + 4002
+    assert data["commands"]["equal_to_the_bit"] == 3  # standing at first: the engine is off
+    for word in ("mpc_step", "1,800,001", "my board", "to the bit", "67,840 B", "0.18"):
+        assert word in done.err
+    assert {path.name for path in out.iterdir()} == {
+        f"board_short_mh-costate_f32.{ending}" for ending in ("csv", "json", "png", "html")
+    }
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda text: text[:-9], ["line 6", "cut off"]),
+        (lambda text: text.replace("1800001", "1800009"), ["line 4 is damaged"]),
+        (lambda text: "\x1b[31mno log", ["no line QPMPC1,start"]),
+        (lambda text: re.sub("step,1.*\n", "", text), ["1 of 3 seconds are missing: 1"]),
+        (lambda text: text_of(bodies(3)), ["is of another program", IDENTITY]),
+    ],
+)
+def test_a_bad_log_is_one_line(cli, project, change, words):
+    text = (project / "board.log").read_bytes().decode()
+    (project / "bad.log").write_text(change(text), newline="")
+    cli("pil", "--project", project, "--from-log", project / "bad.log").assert_refused(*words)
+
+
+def test_commands_that_differ_are_one_line(cli, project):
+    log = project / "board.log"
+    identity = re.search("start,([0-9a-f]{16})", log.read_text())[1]
+    lines = [body.replace(IDENTITY, identity) for body in bodies(3, unit="ns", hz=0)]
+    log.write_text(text_of(lines))  # 100 W, where the engine is off
+    done = cli("pil", "--project", project, "--from-log", log)
+    done.assert_refused("second 0: the board commands 100.0 W, this machine engine off")
+
+
+def test_a_clock_of_no_effect_is_refused(cli, project):
+    log = project / "board.log"
+    done = cli("pil", "--project", project, "--from-log", log, "--clock-mhz", "480")
+    done.assert_refused("--clock-mhz has no effect: the log counts ns")
+
+
+@pytest.fixture
 def no_run(monkeypatch):
     def run(*_, **__):
         raise AssertionError("bad input must be found before any run")
@@ -110,6 +177,23 @@ def no_run(monkeypatch):
         (["nycc", "--set", "x"], ["KEY=VALUE"]),
         (["nycc", "--set", "mh_qp.admm.iterations=0"], ["iterations"]),
         (["nycc", "--set", "mh_qp.admm.relaxation=2.5"], ["relaxation"]),
+        (["nycc", "--target", "linux"], ["linux", "cortex-m7"]),
+        (["nycc", "--seconds", "5"], ["--seconds has no effect without --project"]),
+        (["nycc", "--clock-mhz", "480"], ["--clock-mhz has no effect"]),
+        (["nycc", "--project", "file"], ["--project", "file"]),
+        (["nycc", "--project", "new", "--target", "host"], ["host", "cortex-m7, linux"]),
+        (["nycc", "--project", "new", "--pareto"], ["--pareto has no effect with --project"]),
+        (["nycc", "--project", "new", "--out", "o"], ["--out has no effect with --project"]),
+        (["nycc", "--project", "new", "--json", "-"], ["--json has no effect with --project"]),
+        (["nycc", "--project", "new", "--seconds", "0"], ["--seconds", "1 to 598"]),
+        (["nycc", "--project", "new", "--seconds", "599"], ["--seconds", "1 to 598"]),
+        (["nycc", "--project", "new", "--clock-mhz", "480000000"], ["--clock-mhz", "1 to 4000"]),
+        (["nycc", "--project", "new", "--clock-mhz", "nan"], ["--clock-mhz", "nan"]),
+        (["--from-log", "file"], ["--from-log needs --project"]),
+        (["nycc", "--project", "new", "--from-log", "file"], ["CYCLE has no effect"]),
+        (["--project", "new", "--from-log", "file", "--seconds", "5"], ["--seconds has no effect"]),
+        (["--project", "new", "--from-log", "file"], ["new/replay.toml", "no such file"]),
+        (["--project", "new"], ["CYCLE"]),
         (["nycc", "--json", "."], ["--json", "directory"]),
         (["nycc", "--out", "file"], ["--out", "file"]),
         (["nycc", "--pareto", "--out", "file/deeper"], ["--out", "file"]),

@@ -1,9 +1,10 @@
 /* The replay on a board with a Cortex-M7: the one file to edit. What is YOURS is marked.
  *
+ * With -DREPLAY_VENDOR=1 it needs nothing of this project's start-up and linker script, and has no
+ * main: call port_start and then replay_run from that of your vendor's project.
  * Registers of the core are the same on every Cortex-M7. With -DREPLAY_QEMU=1 this is the port for
  * QEMU's mps2-an500, which has no cycle counter and no caches: there a timer counts instructions.
  */
-#include "board.h"
 #include "replay.h"
 #include "replay_identity.h"
 #include "replay_port.h"
@@ -12,6 +13,14 @@
 
 #ifndef REPLAY_QEMU
 #define REPLAY_QEMU 0
+#endif
+
+#ifndef REPLAY_VENDOR
+#define REPLAY_VENDOR 0
+#endif
+
+#if !REPLAY_VENDOR
+#include "board.h"
 #endif
 
 #if REPLAY_QEMU
@@ -66,15 +75,6 @@
 #define DCISW REGISTER(0xE000EF60u)
 #define WAY_SHIFT 30u /* 4 ways, as every Cortex-M7 has */
 #define SET_SHIFT 5u  /* lines of 32 bytes */
-
-extern uint32_t link_flash_start[];
-extern uint32_t link_data_load[];
-extern uint32_t link_data_start[];
-extern uint32_t link_data_end[];
-extern uint32_t link_bss_start[];
-extern uint32_t link_bss_end[];
-
-int main(void);
 
 static void barrier(void) { __asm volatile("dsb\n isb" ::: "memory"); }
 
@@ -147,14 +147,6 @@ uint32_t port_ticks(void) { return DWT_CYCCNT; }
 
 uint32_t port_units(uint32_t ticks) { return ticks; }
 
-/* After the trip, and after a fault: the log then ends before its last line. */
-void board_exit(int32_t code)
-{
-    (void)code;
-    for (;;) {
-    }
-}
-
 #endif
 
 void port_start(void)
@@ -177,7 +169,25 @@ void port_write(const char *text, uint32_t length)
 /* YOURS: to measure as in a car, wait here for a tick of 1 Hz and let other tasks use the caches. */
 void port_next_second(void) {}
 
-/* The next three are of the project's own start-up and linker script; return 0 with others. */
+#if REPLAY_VENDOR
+
+uint32_t port_stack_bytes(void) { return 0u; }
+
+uint32_t port_flash_bytes(void) { return 0u; }
+
+uint32_t port_ram_bytes(void) { return 0u; }
+
+#else
+
+extern uint32_t link_flash_start[];
+extern uint32_t link_data_load[];
+extern uint32_t link_data_start[];
+extern uint32_t link_data_end[];
+extern uint32_t link_bss_start[];
+extern uint32_t link_bss_end[];
+
+int main(void);
+
 uint32_t port_stack_bytes(void) { return board_stack_used(); }
 
 uint32_t port_flash_bytes(void)
@@ -192,9 +202,20 @@ uint32_t port_ram_bytes(void)
     return initial + ((uint32_t)link_bss_end - (uint32_t)link_bss_start);
 }
 
-/* Leave this out where your vendor's project has a main, and call these two from there. */
+#if !REPLAY_QEMU
+/* After the trip, and after a fault: the log then ends before its last line. */
+void board_exit(int32_t code)
+{
+    (void)code;
+    for (;;) {
+    }
+}
+#endif
+
 int main(void)
 {
     port_start();
     return replay_run();
 }
+
+#endif
