@@ -78,7 +78,9 @@ class BoardResult:
         """Return the figures as plain data, ready for JSON."""
         about, log = self.manifest, self.log
         difference = self.difference_w
-        equal = (difference == 0.0) & (log.engine_on == self.expected.engine_on)
+        alike = log.engine_on == self.expected.engine_on
+        equal = (difference == 0.0) & alike
+        running = log.engine_on | self.expected.engine_on
         return {
             "cycle": about.cycle,
             "vehicle": about.vehicle,
@@ -105,7 +107,9 @@ class BoardResult:
             },
             "commands": {
                 "equal_to_the_bit": int(equal.sum()),
-                "largest_difference_w": float(difference.max()),
+                "engine_on_seconds": int(running.sum()),
+                "engine_on_equal_to_the_bit": int((equal & running).sum()),
+                "largest_difference_w": float(difference[alike].max(initial=0.0)),
                 "tolerance_w": self.tolerance_w,
                 "differ_by_more": [int(k) for k in self.differing],
             },
@@ -188,7 +192,7 @@ def check_log(folder: Path, file: Path, clock_mhz: float | None = None) -> Board
         clock_mhz = log.hz / 1e6
     clock = None if clock_mhz is None else checked_mhz(clock_mhz)
     result = BoardResult(manifest, log, replayed(manifest, sources), clock)
-    _check_commands(result, owner)
+    check_commands(result, owner)
     return result
 
 
@@ -219,7 +223,14 @@ def replayed(manifest: Manifest, sources: dict[str, str]) -> Commands:
     return Commands(power_w, engine_on == 1, rung.astype(np.int64), flags.astype(np.int64))
 
 
-def _check_commands(result: BoardResult, owner: str) -> None:
+def check_commands(result: BoardResult, owner: str) -> None:
+    """Check that round-off explains every difference; `owner` begins the message.
+
+    Raises
+    ------
+    InputError
+        If it does not.
+    """
     log, expected = result.log, result.expected
     off = np.flatnonzero((log.rung != expected.rung) | (log.flags != expected.flags))
     if len(off):

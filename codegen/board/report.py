@@ -74,7 +74,9 @@ def board_lines(data: dict[str, Any]) -> list[str]:
         clock = f"{data['clock_mhz']:g} MHz"
     lines = [
         f"commands             {commands['equal_to_the_bit']} of {data['seconds']} equal this "
-        f"machine's to the bit, the others to {commands['largest_difference_w']:.3g} W at most; "
+        f"machine's to the bit ({commands['engine_on_equal_to_the_bit']} of "
+        f"{commands['engine_on_seconds']} with the engine on), the others to "
+        f"{commands['largest_difference_w']:.3g} W at most where both run it; "
         f"{len(differ)} differ by more than {commands['tolerance_w']:.3g} W or in on and off{at}",
         f"clock                {clock}",
     ]

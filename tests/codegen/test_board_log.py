@@ -1,9 +1,16 @@
 """A board's log: read whole out of noise, or refused in one line that says why."""
 
+import re
+from contextlib import nullcontext
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from board_log import IDENTITY, bodies, line, text_of
+from hostile_inputs import MANIFEST
 
+from qpmpc.codegen.board.check import BoardResult, Commands, check_commands
 from qpmpc.codegen.board.log import read_log
 from qpmpc.errors import InputError
 
@@ -135,3 +142,57 @@ def test_every_single_changed_character_of_a_run_is_noticed(read) -> None:
         damaged = lines[4][:at] + chr(ord(lines[4][at]) ^ 1) + lines[4][at + 1 :]
         with pytest.raises(InputError):
             read("".join([*lines[:4], damaged, *lines[5:]]))
+
+
+def test_the_documented_lines_are_of_this_format(read) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "embedded.md").read_text("utf-8")
+    start, *others = re.findall(r"^QPMPC1,.*$", page, re.MULTILINE)
+    assert len(others) >= 3
+    # right lines, of a run that is not all there
+    with pytest.raises(InputError, match="596 of 598 seconds are missing"):
+        read("\n".join([start, *others]))
+
+
+def compared(precision: str, seconds: int, differing: int, **changed) -> BoardResult:
+    """A log whose first seconds have another power than expected."""
+    manifest = MANIFEST.model_copy(update={"precision": precision, "seconds": seconds})
+    zeros = np.zeros(seconds, dtype=np.int64)
+    power_w = np.full(seconds, 20e3)
+    expected = Commands(power_w.copy(), power_w > 0.0, zeros, zeros)
+    power_w[:differing] = changed.get("power_w", 0.0)
+    of_board = {"power_w": power_w, "engine_on": power_w > 0.0, "rung": zeros}
+    of_board |= {"precision": precision, "step": zeros + 1, "forecast": zeros}
+    of_board["flags"] = np.where(np.arange(seconds) < changed.get("flagged", 0), 4, 0)
+    log = SimpleNamespace(**of_board, unit="cycles", remarks=())
+    return BoardResult(manifest, log, expected, None)
+
+
+@pytest.mark.parametrize(
+    ("precision", "seconds", "differing", "message"),
+    [
+        ("f32", 100, 1, ""),  # a tie
+        ("f32", 3, 1, ""),
+        ("f32", 101, 2, ""),
+        ("f32", 100, 2, "engine off, this machine 20000.0 W.* in 2 of 100 seconds, where 1 may be"),
+        ("f64", 100, 1, "in 1 of 100 seconds, where 0 may be"),
+        ("f64", 100, 0, ""),
+    ],
+)
+def test_only_round_off_may_tell_commands_apart(precision, seconds, differing, message) -> None:
+    result = compared(precision, seconds, differing)
+    assert len(result.differing) == differing
+    with pytest.raises(InputError, match=message) if message else nullcontext():
+        check_commands(result, "board.log")
+
+
+@pytest.mark.parametrize(("precision", "within_w"), [("f32", 1700.0), ("f64", 0.05)])
+def test_the_tolerance_is_that_stated(precision, within_w) -> None:
+    """3 % and 1e-6 of 57 kW: 1,710 W and 0.057 W."""
+    for factor, count in ((1.0, 0), (1.2, 5)):
+        result = compared(precision, 100, 5, power_w=20e3 + factor * within_w)
+        assert len(result.differing) == count
+
+
+def test_flags_must_be_equal() -> None:
+    with pytest.raises(InputError, match="second 0: the board says rung 0, solver failed"):
+        check_commands(compared("f32", 100, 0, flagged=3), "board.log")
