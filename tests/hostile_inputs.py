@@ -14,7 +14,7 @@ from board_log import bodies, line, text_of
 from hypothesis import strategies as st
 
 from qpmpc.codegen.board.log import read_log
-from qpmpc.codegen.board.manifest import Manifest, load_manifest
+from qpmpc.codegen.board.manifest import Manifest, load_manifest, load_sources
 from qpmpc.cycles import load_cycle
 from qpmpc.faults.models import load_faults
 from qpmpc.registry import split_settings
@@ -239,7 +239,7 @@ LOADERS: dict[str, Loader] = {
     "board log": Loader(board_logs() | st.binary(max_size=200), _file("board.log", read_log)),
     "board project": Loader(
         edited(MANIFEST.text(), "=") | st.binary(max_size=200),
-        _file("replay.toml", lambda path: load_manifest(path.parent)),
+        _file("replay.toml", lambda path: load_sources(path.parent, load_manifest(path.parent))),
     ),
     "engine": Loader(edited(ENGINE, ",") | st.binary(max_size=200), _file("map.csv", _load_map)),
 }

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.codegen.board.log import BoardLog, read_log
-from qpmpc.codegen.board.manifest import Manifest, load_manifest
+from qpmpc.codegen.board.manifest import Manifest, load_manifest, load_sources
 from qpmpc.codegen.board.project import checked_mhz
 from qpmpc.codegen.c_compiler import CodegenError
 from qpmpc.codegen.host_library import compiled, loaded, structures
@@ -171,7 +171,8 @@ def check_log(folder: Path, file: Path, clock_mhz: float | None = None) -> Board
         If there is no C compiler here, or it fails.
     """
     owner = f"--from-log {file}"
-    manifest, sources = load_manifest(folder)
+    manifest = load_manifest(folder)
+    sources = load_sources(folder, manifest)
     log = read_log(file)
     if log.identity != manifest.identity:
         raise InputError(

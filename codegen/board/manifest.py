@@ -82,22 +82,31 @@ def digests(files: Mapping[str, str]) -> dict[str, str]:
     }
 
 
-def load_manifest(folder: Path) -> tuple[Manifest, dict[str, str]]:
-    """Read a project again: what it says of itself, and its sources, by name.
+def load_manifest(folder: Path) -> Manifest:
+    """Read what a project says of itself.
 
     Raises
     ------
     InputError
-        If it is none, or a source is not as it was written.
+        If the folder holds none.
     """
     path = folder / NAME
-    prefix = f"--project {folder}: "
     text = read_text(path, MEGABYTES_MAX, "--project ")
-    manifest = validated(Manifest, load_toml(text, str(path)), str(path))
-    sources = {}
+    return validated(Manifest, load_toml(text, str(path)), str(path))
+
+
+def load_sources(folder: Path, manifest: Manifest) -> dict[str, str]:
+    """Read the sources of a project, by name.
+
+    Raises
+    ------
+    InputError
+        If one is not as it was written.
+    """
+    prefix, sources = f"--project {folder}: ", {}
     for name, digest in manifest.files.items():
         if not re.match(_SOURCE, name):
-            raise InputError(f"{path}: {name!r} is no name of a source")
+            raise InputError(f"{folder / NAME}: {name!r} is no name of a source")
         source = read_text(folder / name, SOURCE_MEGABYTES_MAX, prefix).replace("\r\n", "\n")
         if hashlib.sha256(source.encode()).hexdigest() != digest:
             raise InputError(
@@ -105,7 +114,7 @@ def load_manifest(folder: Path) -> tuple[Manifest, dict[str, str]]:
                 "changes into replay_port.c"
             )
         sources[name] = source
-    return manifest, sources
+    return sources
 
 
 def _toml(value: str | float | bool) -> str:

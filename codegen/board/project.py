@@ -156,7 +156,7 @@ def checked_mhz(clock_mhz: float) -> float:
 
 def _check_target(folder: Path, target: BoardTarget) -> None:
     if (folder / NAME).exists():
-        there = load_manifest(folder)[0].target
+        there = load_manifest(folder).target
         if there != target:
             raise InputError(f"--project {folder} is for {there}: use another folder for {target}")
 

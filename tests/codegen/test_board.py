@@ -138,6 +138,7 @@ def test_ports_are_kept_and_targets_do_not_mix(tmp_path) -> None:
     first = write_project(trip, QUICK, tmp_path, seconds=2)
     assert first.kept == []
     (tmp_path / "replay_port.c").write_text("mine")
+    (tmp_path / "mpc.h").write_text("edited")  # no reason not to make it again
     again = write_project(trip, QUICK, tmp_path, seconds=3, clock_mhz=216)
     assert again.kept == ["replay_port.c", "replay.ld"]
     assert (tmp_path / "replay_port.c").read_text() == "mine"
