@@ -26,7 +26,7 @@ void fault_handler(void);
 #define MPU_BASE (*(volatile uint32_t *)0xE000ED9Cu)
 #define MPU_SIZE (*(volatile uint32_t *)0xE000EDA0u)
 #define MPU_ENABLE_WITH_DEFAULT_MAP 5u
-#define MPU_READ_ONLY_4_MB ((6u << 24) | (21u << 1) | 1u)
+#define MPU_READ_ONLY_4_MB ((6u << 24) | (1u << 17) | (21u << 1) | 1u) /* normal memory, cached */
 
 typedef void (*vector)(void);
 

@@ -146,6 +146,36 @@ def test_commands_that_differ_are_one_line(cli, project):
     done.assert_refused("second 0: the board commands 100.0 W, this machine engine off")
 
 
+@pytest.mark.parametrize(
+    ("hz", "options", "milliseconds"),
+    [
+        (480_000_000, (), 1_800_001 / 480e3),
+        (480_000_000, ("--clock-mhz", "240"), 1_800_001 / 240e3),
+        (0, ("--clock-mhz", "216"), 1_800_001 / 216e3),
+        (0, (), None),
+    ],
+)
+def test_cycles_are_time_by_the_clock(cli, project, strict_json, hz, options, milliseconds):
+    log = project / "board.log"
+    text = log.read_bytes().decode().replace(",ns,0,", f",cycles,{hz},")
+    log.write_text(text_of([body.split("*")[0][7:] for body in text.split("\r\n")[:-1]]))
+    done = cli("pil", "--project", project, "--from-log", log, *options, "--json", "-")
+    assert done.code == 0, done.err
+    data = strict_json(done.out)
+    assert data["times"]["step"]["median_ms"] == (milliseconds and pytest.approx(milliseconds))
+    assert (data["clock_mhz"] is None) == (milliseconds is None)
+    said = "the clock is not known: give --clock-mhz"
+    assert (said in done.err) == (said in str(data["remarks"])) == (milliseconds is None)
+
+
+def test_a_counter_that_stands_still_is_found(cli, project):
+    log = project / "board.log"
+    text = re.sub(r"(step,\d),\d+,\d+", r"\1,0,0", log.read_bytes().decode())
+    log.write_text(text_of([body.split("*")[0][7:] for body in text.split("\r\n")[:-1]]))
+    done = cli("pil", "--project", project, "--from-log", log)
+    done.assert_refused("every step took 0 ns", "the counter stands still")
+
+
 def test_a_clock_of_no_effect_is_refused(cli, project):
     log = project / "board.log"
     done = cli("pil", "--project", project, "--from-log", log, "--clock-mhz", "480")
