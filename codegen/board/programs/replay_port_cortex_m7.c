@@ -149,11 +149,16 @@ uint32_t port_units(uint32_t ticks) { return ticks; }
 
 #endif
 
+/* Caches that a vendor's start-up has enabled stay: to invalidate one in use would lose data. */
 void port_start(void)
 {
     start_board();
-    enable_instruction_cache();
-    enable_data_cache();
+    if ((CCR & CCR_INSTRUCTION_CACHE) == 0u) {
+        enable_instruction_cache();
+    }
+    if ((CCR & CCR_DATA_CACHE) == 0u) {
+        enable_data_cache();
+    }
     start_cycle_counter();
 }
 
