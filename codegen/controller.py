@@ -56,6 +56,7 @@ class InputBuilder:
         into.long_rises[:] = long.rises.tolist()
         into.long_fall_j[:] = long.fall_j.tolist()
         into.long_rise_j[:] = long.rise_j.tolist()
+        into.short_rise_j = preview.short_rise_j
 
 
 class GeneratedController(Controller):

@@ -27,7 +27,7 @@ from qpmpc.codegen.library_cache import Kept, kept_file
 from qpmpc.codegen.values import Values
 from qpmpc.remarks import say_once
 
-ABI_VERSION = 6
+ABI_VERSION = 7
 _ABI_NAMES = (
     "version",
     "sizeof mpc_real",
@@ -75,6 +75,7 @@ def structures(precision: Precision, short: int, long: int, learning: bool) -> t
             ("long_rises", real * long),
             ("long_fall_j", real * long),
             ("long_rise_j", real * long),
+            ("short_rise_j", real),
             ("short_count", ctypes.c_int32),
             ("second", ctypes.c_int32),
             ("engine_on", ctypes.c_int32),

@@ -45,7 +45,7 @@ CONSTANTS_OF_ALL = of_modules(
     (safety, "POWER_MARGIN_W SOC_MARGIN T_CL_MARGIN_K"),
     (monitor, "LONG_AGO_S LONGEST_GAP_S"),
     (checked, "LONGEST_STAGE_S NEWS"),
-    (swing, "NO_LIMIT_J LEAST_KEPT_J"),
+    (swing, "NO_LIMIT_J LEAST_KEPT_J DRAIN_SHARE FILLED_SHARE"),
     (coolant_floor, "USABLE"),
     (qp_planner, "FAILURES_FORGIVEN"),
     (base, "LARGEST_PLAUSIBLE"),

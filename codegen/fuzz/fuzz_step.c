@@ -135,6 +135,7 @@ static void attack_preview(source *from)
         in.long_fall_j[k] = (mpc_real)between(from, 0, 1) * mpc_par.can_energy_j;
         in.long_rise_j[k] = (mpc_real)between(from, 0, 1) * mpc_par.can_energy_j;
     }
+    in.short_rise_j = (mpc_real)between(from, 0, 1) * mpc_par.can_energy_j;
 }
 
 static void attack_inputs(source *from)

@@ -57,6 +57,9 @@ typedef struct {
      * next (0 if it is not known) */
     mpc_real long_fall_j[MPC_LONG];
     mpc_real long_rise_j[MPC_LONG];
+    /* energy, J, by which SOC at the end of the MPC_SHORT seconds stays off its upper limit: room for
+     * the braking beyond (0 if it is not known, and where they reach the arrival) */
+    mpc_real short_rise_j;
     int32_t short_count; /* seconds of the short preview before arrival, 1..MPC_SHORT */
     int32_t second;      /* clock: seconds since departure */
     int32_t engine_on;   /* measured: 1 if the engine ran in the last second, else 0 */
@@ -117,7 +120,7 @@ void mpc_plan(const mpc_state *state, mpc_real *x, mpc_real *duals);
 /* Layout of this build, for callers in other languages to check theirs: version of this
  * interface, sizeof mpc_real, mpc_in, mpc_out, mpc_state, then MPC_SHORT, MPC_LONG, MPC_VARS,
  * MPC_ROWS, MPC_ITERATIONS, offset of mpc_in.short_count, of mpc_out.engine_on. */
-#define MPC_ABI_VERSION 6
+#define MPC_ABI_VERSION 7
 #define MPC_ABI_ENTRIES 12
 int32_t mpc_abi(int32_t entry);
 

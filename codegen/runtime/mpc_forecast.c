@@ -143,6 +143,65 @@ static void find_swings(mpc_forecast *forecast)
     }
 }
 
+/* Room below the upper SOC limit that the trip needs from a second on, from that of the next: what
+ * braking gives, less a share of what driving with the engine off takes. */
+static mpc_real room_before_j(const mpc_forecast *forecast, int32_t second, mpc_real next_j)
+{
+    const mpc_real internal_w =
+        mpc_map_planned_internal_w(battery_side_w(forecast->trip.demand_w[second]));
+    const mpc_real taken_w = (internal_w > REAL(0.0)) ? (DRAIN_SHARE * internal_w) : internal_w;
+    const mpc_real most_j = FILLED_SHARE * (mpc_par.soc_max - mpc_par.soc_min)
+                            * mpc_par.battery_energy_j;
+    return real_min(real_max(next_j - taken_w, REAL(0.0)), most_j);
+}
+
+/* Seconds between two places at which the room is kept. */
+static int32_t room_spacing(const mpc_forecast *forecast)
+{
+    const int32_t needed = (forecast->covered + (MPC_ROOMS - 1)) / MPC_ROOMS;
+    return (needed > MPC_ROOM_S) ? needed : MPC_ROOM_S;
+}
+
+static void find_rooms(mpc_forecast *forecast)
+{
+    const int32_t spacing = room_spacing(forecast);
+    mpc_real room_j = REAL(0.0);
+    for (int32_t k = 0; k < MPC_ROOMS; k++) {
+        forecast->room_j[k] = REAL(0.0);
+    }
+    for (int32_t second = forecast->covered - 1; second >= 0; second--) {
+        room_j = room_before_j(forecast, second, room_j);
+        if ((second % spacing) == 0) {
+            forecast->room_j[second / spacing] = room_j;
+        }
+    }
+}
+
+/* The room from a second on; an averaged preview knows nothing of braking. */
+static mpc_real room_from_j(const mpc_forecast *forecast, int32_t from)
+{
+    mpc_real room_j = REAL(0.0);
+#if MPC_CLASSES > 1
+    if ((from >= 0) && (from < forecast->covered)) {
+        const int32_t spacing = room_spacing(forecast);
+        const int32_t place = (from / spacing) + 1;
+        int32_t second = forecast->covered;
+        if ((place * spacing) < forecast->covered) {
+            second = place * spacing;
+            room_j = forecast->room_j[place];
+        }
+        while (second > from) {
+            second--;
+            room_j = room_before_j(forecast, second, room_j);
+        }
+    }
+#else
+    (void)forecast;
+    (void)from;
+#endif
+    return room_j;
+}
+
 static int32_t is_believable(const mpc_road *trip)
 {
     int32_t fine = ((trip->steps >= 1) && (trip->steps <= MPC_LONGEST_TRIP_S)) ? 1 : 0;
@@ -173,6 +232,7 @@ int32_t mpc_forecast_start(mpc_forecast *forecast, const mpc_road *trip)
     forecast->covered = (steps < held) ? steps : held;
     sum_up(forecast);
     find_swings(forecast);
+    find_rooms(forecast);
     return (fine != 0) ? 0 : -1;
 }
 
@@ -263,6 +323,7 @@ static int32_t fill(mpc_forecast *forecast, int32_t step, int32_t beyond, const 
     }
     fill_short(seen, in);
     fill_long(forecast, is_arriving, in);
+    in->short_rise_j = (is_arriving == 0) ? room_from_j(forecast, beyond) : REAL(0.0);
     return (is_under_way != 0) ? 0 : -1;
 }
 

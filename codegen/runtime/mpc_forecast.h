@@ -53,6 +53,11 @@ typedef struct {
     mpc_real rise_j;
 } mpc_swing;
 
+/* The room for braking is kept at so many places, as many seconds apart or more in a trip of over two
+ * hours; in between it is found again every second. */
+#define MPC_ROOMS 225
+#define MPC_ROOM_S 32
+
 /* Memory of one forecast. Its contents are private; the caller needs only its size. */
 typedef struct {
     uint32_t magic; /* tells a started forecast from any other memory, as does magic_end */
@@ -62,6 +67,7 @@ typedef struct {
     int32_t next;    /* first second that is still in the sums */
     mpc_class_sums ahead[MPC_LONG];
     mpc_swing swing[MPC_BLOCKS]; /* kept from the SOC limits at the end of each block */
+    mpc_real room_j[MPC_ROOMS];  /* for the braking from each of them on */
     uint32_t magic_end;
 } mpc_forecast;
 

@@ -28,6 +28,7 @@ static int32_t is_stage(mpc_real duration_s, mpc_real speed_mps, mpc_real must_s
 static int32_t is_possible(const mpc_in *in)
 {
     int32_t fine = ((in->short_count >= 1) && (in->short_count <= MPC_SHORT)) ? 1 : 0;
+    fine &= within(in->short_rise_j, REAL(0.0), mpc_par.can_energy_j);
     for (int32_t k = 0; k < MPC_SHORT; k++) {
         fine &= mpc_check_second(in->short_demand_w[k], in->short_speed_mps[k]);
     }

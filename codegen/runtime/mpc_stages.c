@@ -23,7 +23,7 @@ void mpc_stages_take(mpc_state *state, const mpc_in *in)
         stage->road.free_internal_off_w = stage->road.internal_off_w;
         stage->road.rises = seen;
         stage->road.fall_j = REAL(0.0);
-        stage->road.rise_j = REAL(0.0);
+        stage->road.rise_j = (k == (MPC_SHORT - 1)) ? in->short_rise_j : REAL(0.0);
     }
     for (int32_t k = 0; k < MPC_LONG; k++) {
         mpc_stage *const stage = &state->stage[MPC_SHORT + k];
@@ -62,7 +62,7 @@ void mpc_stages_move_up(mpc_state *state, int32_t by)
         road->free_internal_off_w = seen * later->free_internal_off_w;
         road->rises = seen * later->rises;
         road->fall_j = REAL(0.0);
-        road->rise_j = REAL(0.0);
+        road->rise_j = seen * later->rise_j;
     }
 }
 

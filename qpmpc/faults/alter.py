@@ -57,7 +57,7 @@ def altered_preview(fault: Fault, second: int, first: Preview, now: Preview) -> 
 def _missing(now: Preview) -> Preview:
     """Return an empty message: nothing is driven."""
     short, long = np.zeros_like(now.short_demand_w), np.zeros_like(now.long.duration_s)
-    return Preview(short, short.copy(), 0, Stages(*np.zeros((len(fields(Stages)), len(long)))))
+    return Preview(short, short.copy(), 0, Stages(*np.zeros((len(fields(Stages)), len(long)))), 0.0)
 
 
 def _wild(now: Preview, second: int) -> Preview:
@@ -80,6 +80,7 @@ def _wild(now: Preview, second: int) -> Preview:
             rng.uniform(0.0, WILD_J, long),
             rng.uniform(0.0, WILD_J, long),
         ),
+        float(rng.uniform(0.0, WILD_J)),
     )
 
 

@@ -117,6 +117,7 @@ class CheckedPreview:
             and _within(long.rises, 0.0, LONGEST_STAGE_S)
             and _within(long.fall_j, 0.0, can.energy_j)
             and _within(long.rise_j, 0.0, can.energy_j)
+            and 0.0 <= preview.short_rise_j <= can.energy_j
         )
 
     def _goes_on(self, preview: Preview, step: int) -> bool:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from qpmpc.preview.forecast import Trace, internal_off_w
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.preview.place import forecast_seconds
-from qpmpc.preview.swing import NO_LIMIT_J, swings
+from qpmpc.preview.swing import NO_LIMIT_J, rooms, swings
 from qpmpc.vehicle.must_run import must_run, too_fast
 from qpmpc.vehicle.parameters import Vehicle
 
@@ -38,8 +38,8 @@ class Stages:
     rises : r_k, starts of the engine in the stage per on-share that it has more than the stage
         before: u_k >= r_k (sigma_k - sigma_k-1)
     fall_j, rise_j : energy that SOC keeps from its lower and its upper limit at the stage's end,
-        see `qpmpc.preview.swing`: more than 0 at the end of a block ahead, 0 for 1 s, -NO_LIMIT_J
-        inside a block, where it is not limited
+        see `qpmpc.preview.swing`: more than 0 at the end of a block ahead, 0 for 1 s but for the
+        rise of the last before the blocks, -NO_LIMIT_J inside a block, where it is not limited
     """
 
     duration_s: NDArray[np.float64]
@@ -78,12 +78,15 @@ class Preview(NamedTuple):
     long : statistics of the trip beyond, block by block, class by class; `rises`: how often the
         demand rises into that class or past it; `fall_j`, `rise_j`: of the block's end, read in
         its last class alone
+    short_rise_j : room for the braking beyond, at the end of the N seconds; 0 where they reach
+        the arrival
     """
 
     short_demand_w: NDArray[np.float64]
     short_speed_mps: NDArray[np.float64]
     short_count: int
     long: Stages
+    short_rise_j: float
 
 
 class StageBuilder:
@@ -126,6 +129,7 @@ class StageBuilder:
         self._block_start = np.minimum(start, forecast.steps)
         self._block_end = np.minimum(start + block_s, forecast.steps)
         self._swing_j = swings(forecast, vehicle, settings, self._block_start, self._block_end)
+        self._room_j = rooms(forecast, vehicle, settings)
 
     def preview(self, step: int) -> Preview:
         """Return the trip ahead from time step `step`; short_count is 0 after arrival."""
@@ -142,6 +146,7 @@ class StageBuilder:
             self._speed_mps[now : now + n],
             min(n, self.steps - now),
             Stages(*np.vstack([fields, rises.T.ravel(), swing_j])),
+            0.0 if self._arrives(now) else float(self._room_j[self.beyond(now)]),
         )
 
     def at(self, step: int) -> Stages:
@@ -169,6 +174,7 @@ class StageBuilder:
         rises[:seen] = 1.0
         rises[n:] = starts_per_rise(long.rises, self.settings)
         swing_j = np.zeros((2, self.count))
+        swing_j[1, n - 1] = preview.short_rise_j
         classes = self.settings.classes
         ends_block = np.arange(len(long.fall_j)) % classes == classes - 1
         swing_j[:, n:] = np.where(ends_block, (long.fall_j, long.rise_j), -NO_LIMIT_J)
@@ -176,10 +182,14 @@ class StageBuilder:
 
     def _long_start(self, step: int) -> NDArray[np.intp]:
         """First second of each block beyond the short horizon; its end where there is none."""
-        if step + self.settings.short_stages >= self.steps:  # arriving
+        if self._arrives(step):
             return self._block_end
         start: NDArray[np.intp] = np.clip(self.beyond(step), self._block_start, self._block_end)
         return start
+
+    def _arrives(self, step: int) -> bool:
+        """Whether the short horizon reaches the arrival."""
+        return step + self.settings.short_stages >= self.steps
 
     def beyond(self, step: int) -> int:
         """Return the first second of the forecast beyond the short horizon of a time step."""

@@ -3,7 +3,8 @@
 Inside a long block braking fills the battery and launches drain it. A plan that knows only where
 the block ends would end it at a limit; on the road the braking energy is then thrown away. So two
 numbers of each block's end go with its statistics: how far below and above it the battery's energy
-comes, there and before the block's own end.
+comes, there and before the block's own end. A third goes with the short horizon, second by second:
+the room that the braking beyond it needs.
 """
 
 import numpy as np
@@ -20,6 +21,10 @@ NO_LIMIT_J = 1e10
 """Beyond any car's battery: of the classes inside a block, whose order in time is not known."""
 LEAST_KEPT_J = 1.0
 """Tells the end of a block, with however little swing, from a second and from a block passed."""
+DRAIN_SHARE = 0.8
+"""Of what driving with the engine off takes out of the battery."""
+FILLED_SHARE = 0.9
+"""Of the battery's energy between its limits: no more is kept free for braking."""
 
 
 def swings(
@@ -64,6 +69,39 @@ def swings(
     most = 0.5 * room * BatteryMaps(battery).energy_j(vehicle.trip.soc_mean)
     kept: Floats = np.minimum(settings.swing_share * np.maximum(own, following), most)
     return np.maximum(kept, LEAST_KEPT_J)
+
+
+def rooms(forecast: Trace, vehicle: Vehicle, settings: HorizonSettings) -> Floats:
+    """Room below the upper SOC limit that the trip from each second on needs, J.
+
+    With l the internal power with the engine off, negative in braking,
+
+        R_t = max(R_t+1 - l_t, 0) in braking,   max(R_t+1 - `DRAIN_SHARE` l_t, 0) in driving
+
+    and at most `FILLED_SHARE` of what the battery holds between its limits; 0 at arrival. A battery
+    that has less room throws braking energy away even if the engine rests until then. A share of
+    the driving counts, because the engine also runs for heat, for speed and for its shortest runs.
+    One class has none: an averaged preview knows nothing of braking.
+
+    Parameters
+    ----------
+    forecast : of the whole trip
+
+    Returns
+    -------
+    shape (steps + 1,)
+    """
+    needed = np.zeros(forecast.steps + 1)
+    if settings.classes == 1:
+        return needed
+    battery = vehicle.battery
+    energy_j = BatteryMaps(battery).energy_j(vehicle.trip.soc_mean)
+    most = FILLED_SHARE * (battery.soc_max - battery.soc_min) * energy_j
+    internal_w = forecast.internal_off_w(vehicle)
+    taken_w = np.where(internal_w > 0.0, DRAIN_SHARE * internal_w, internal_w)
+    for step in range(forecast.steps - 1, -1, -1):
+        needed[step] = min(max(needed[step + 1] - taken_w[step], 0.0), most)
+    return needed
 
 
 def _swing(flow_w: Floats, is_hard: NDArray[np.bool_]) -> tuple[float, float]:

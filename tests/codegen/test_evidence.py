@@ -154,6 +154,7 @@ int main(int argc, char **argv)
     in.soc = (mpc_real)0.6;
     in.t_cl_degc = (mpc_real)50;
     in.short_count = MPC_SHORT;
+    in.short_rise_j = (mpc_real)40000;
     mpc_init(&state);
     for (int k = 0; k < atoi(argv[argc - 1]); k++) {
         in.demand_w = (mpc_real)((k * 977) % 20000 - 4000);

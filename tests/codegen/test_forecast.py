@@ -33,7 +33,7 @@ POWERS = (
 )
 SHARES = ("long_must_share",)
 SPEEDS = ("speed_mps", "short_speed_mps", "long_speed_mps")
-SWINGS = ("long_fall_j", "long_rise_j")
+SWINGS = ("long_fall_j", "long_rise_j", "short_rise_j")
 # f64: Python takes differences of a running sum over the whole trip, 1e8 at most, whose last digit
 # is 1e-8; C does not. f32: two units in the last place of 60 kW (0.004 W) and of 40 m/s (4e-6 m/s);
 # a swing adds up the 500 s of a block at most.

@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qpmpc.cycles import load_cycle
+from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.preview import HorizonSettings, StageBuilder, Trace
-from qpmpc.preview.swing import LEAST_KEPT_J, NO_LIMIT_J, swings
+from qpmpc.preview.swing import DRAIN_SHARE, FILLED_SHARE, LEAST_KEPT_J, NO_LIMIT_J, rooms, swings
+from qpmpc.simulation import simulate
 from qpmpc.vehicle import load_vehicle
 from qpmpc.verification.independent.equations import Equations
 
@@ -101,8 +102,62 @@ def test_soc_is_limited_at_the_ends_of_blocks_that_lie_ahead(step, short, blocks
     end = np.minimum(start + length, NYCC.steps)
     of_end = swings(NYCC, CAR, layout, start, end)
     ahead = (end > step + short) & (start < end) & (step + short < NYCC.steps)
-    for found, kept in ((stages.fall_j, of_end[0]), (stages.rise_j, of_end[1])):
-        np.testing.assert_array_equal(found[:short], 0.0)  # seconds are known one by one
+    room_j = rooms(NYCC, CAR, layout)[step + short] if step + short < NYCC.steps else 0.0
+    of_seconds = np.zeros((2, short))  # which are known one by one, but not what comes then
+    of_seconds[1, -1] = room_j
+    for found, kept, of_second in (
+        (stages.fall_j, of_end[0], of_seconds[0]),
+        (stages.rise_j, of_end[1], of_seconds[1]),
+    ):
+        np.testing.assert_array_equal(found[:short], of_second)
         of_class = found[short:].reshape(blocks, 3)
         np.testing.assert_array_equal(of_class[:, :2], -NO_LIMIT_J)
         np.testing.assert_array_equal(of_class[:, 2], kept * ahead)
+
+
+def rooms_of(demand_w: list[float], **changed: int) -> np.ndarray:
+    trace = Trace(np.array(demand_w), np.full(len(demand_w), 10.0))
+    return rooms(trace, CAR, HorizonSettings(**changed))
+
+
+def test_braking_ahead_needs_room_and_driving_before_it_makes_some() -> None:
+    found = rooms_of([EASY_W, BRAKING_W, BRAKING_W, HARD_W])
+    kept = 2.0 * BRAKED_J - DRAIN_SHARE * EASY_J
+    np.testing.assert_allclose(found, [kept, 2.0 * BRAKED_J, BRAKED_J, 0.0, 0.0])
+    assert rooms_of([EASY_W] * 9 + [BRAKING_W])[0] == 0.0
+    assert np.all(rooms_of([BRAKING_W, BRAKING_W], classes=1) == 0.0)
+
+
+@settings(max_examples=60, deadline=None)
+@given(demand_w=st.lists(st.floats(-30e3, 15e3), min_size=1, max_size=400))
+def test_a_battery_with_that_room_is_just_not_overfilled(demand_w) -> None:
+    room_j = rooms_of(demand_w)
+    assert room_j.min() >= 0.0
+    assert room_j.max() <= FILLED_SHARE * ROOM_J * (1.0 + 1e-3)  # of energy: at the mean SOC
+    trace = Trace(np.array(demand_w), np.full(len(demand_w), 10.0))
+    internal_w = trace.internal_off_w(CAR)
+    path_j = np.cumsum(np.where(internal_w > 0.0, -DRAIN_SHARE * internal_w, -internal_w))
+    if room_j.max() < 0.99 * FILLED_SHARE * ROOM_J:
+        assert max(path_j.max(), 0.0) == pytest.approx(room_j[0], abs=1e-3)  # sums of 1e7 J
+
+
+@pytest.mark.parametrize(("controller", "of"), [("mh-qp", "mh_qp"), ("mh-costate", "mh_costate")])
+def test_descents_inside_a_block_find_room_in_a_small_battery(controller, of) -> None:
+    """Two hills within two blocks: without `rooms` 0.5 MJ of them ends in the friction brakes."""
+    time_s = np.arange(901.0)
+    grade = np.zeros(901)
+    for start, end, share in (
+        *((60, 140, 0.04), (140, 330, -0.035), (330, 480, 0.03)),
+        *((560, 700, -0.04), (700, 850, 0.02)),
+    ):
+        grade[start:end] = share
+    speed_mps = np.minimum(14.0, np.minimum(time_s, 900.0 - time_s))
+    hills = Cycle("hills", time_s, speed_mps, grade)
+    run = simulate(
+        hills,
+        controller,
+        vehicle="prius-liion",
+        settings={"trip.soc_init": 0.7, f"{of}.horizon.blocks": 2},
+    )
+    assert run.summary()["friction_brake_j"] < 1e3
+    assert run.trajectory.soc.max() > 0.79  # it needs all the room that there is
