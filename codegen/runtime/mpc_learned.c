@@ -10,6 +10,13 @@
 
 static int32_t is_count(int32_t x, int32_t most) { return ((x >= 0) && (x <= most)) ? 1 : 0; }
 
+/* False for not a number. */
+static int32_t is_sum(mpc_wide x)
+{
+    const mpc_wide most = (mpc_wide)SUM_MOST;
+    return ((x >= -most) && (x <= most)) ? 1 : 0;
+}
+
 /* Place of a power between -1, idling, and 1, full power. */
 static mpc_real place(mpc_real p_eng_w)
 {
@@ -18,10 +25,12 @@ static mpc_real place(mpc_real p_eng_w)
 
 /* Level, tilt and what is late as they are now, by elimination from the last. `weight` is the map's
  * in the equation of each; no pivot is less, but by rounding. */
-static void solve(const mpc_learned *of, mpc_real x[MPC_UNKNOWNS])
+static void solve(const mpc_learned *of, mpc_wide x[MPC_UNKNOWNS])
 {
-    static const mpc_real weight[MPC_UNKNOWNS] = {PRIOR, PRIOR, PRIOR_LATE, PRIOR_LATE, PRIOR_LATE};
-    mpc_real a[MPC_UNKNOWNS][MPC_UNKNOWNS];
+    static const mpc_wide weight[MPC_UNKNOWNS] = {(mpc_wide)PRIOR, (mpc_wide)PRIOR,
+                                                  (mpc_wide)PRIOR_LATE, (mpc_wide)PRIOR_LATE,
+                                                  (mpc_wide)PRIOR_LATE};
+    mpc_wide a[MPC_UNKNOWNS][MPC_UNKNOWNS];
     for (int32_t i = 0; i < MPC_UNKNOWNS; i++) {
         for (int32_t j = 0; j < MPC_UNKNOWNS; j++) {
             a[i][j] = of->square[i][j];
@@ -31,9 +40,9 @@ static void solve(const mpc_learned *of, mpc_real x[MPC_UNKNOWNS])
     }
     x[0] += weight[0];
     for (int32_t k = MPC_UNKNOWNS - 1; k >= 0; k--) {
-        a[k][k] = real_max(a[k][k], weight[k]);
+        a[k][k] = (a[k][k] > weight[k]) ? a[k][k] : weight[k];
         for (int32_t i = 0; i < k; i++) {
-            const mpc_real factor = a[i][k] / a[k][k];
+            const mpc_wide factor = a[i][k] / a[k][k];
             for (int32_t j = 0; j < k; j++) {
                 a[i][j] -= factor * a[k][j];
             }
@@ -51,21 +60,23 @@ static void solve(const mpc_learned *of, mpc_real x[MPC_UNKNOWNS])
 /* Learn from a second in which so much was measured, as a share of the fuel at full power. */
 static void learn(mpc_learned *of, mpc_real measured, mpc_real start)
 {
-    mpc_real found[MPC_UNKNOWNS];
-    mpc_real x[MPC_UNKNOWNS];
+    mpc_wide found[MPC_UNKNOWNS];
+    mpc_wide x[MPC_UNKNOWNS];
     solve(of, found);
-    x[0] = of->fuel[0] - start;
-    x[1] = of->tilted[0];
+    x[0] = (mpc_wide)of->fuel[0] - (mpc_wide)start;
+    x[1] = (mpc_wide)of->tilted[0];
     for (int32_t j = 1; j <= MPC_LATE; j++) {
-        const mpc_real late = real_clip(found[1 + j], REAL(0.0), REAL(1.0));
-        x[1] += late * (of->tilted[j] - of->tilted[j - 1]);
-        x[1 + j] = of->fuel[j] - of->fuel[j - 1];
+        const mpc_real late = real_clip((mpc_real)found[1 + j], REAL(0.0), REAL(1.0));
+        x[1] += (mpc_wide)late * ((mpc_wide)of->tilted[j] - (mpc_wide)of->tilted[j - 1]);
+        x[1 + j] = (mpc_wide)of->fuel[j] - (mpc_wide)of->fuel[j - 1];
     }
+    const mpc_wide kept = (mpc_wide)KEPT;
+    const mpc_wide seen = (mpc_wide)measured - (mpc_wide)start;
     for (int32_t i = 0; i < MPC_UNKNOWNS; i++) {
         for (int32_t j = 0; j < MPC_UNKNOWNS; j++) {
-            of->square[i][j] = (KEPT * of->square[i][j]) + (x[i] * x[j]);
+            of->square[i][j] = (kept * of->square[i][j]) + (x[i] * x[j]);
         }
-        of->product[i] = (KEPT * of->product[i]) + ((measured - start) * x[i]);
+        of->product[i] = (kept * of->product[i]) + (seen * x[i]);
     }
 }
 
@@ -128,10 +139,11 @@ static mpc_real chord(const mpc_real *fuel, int32_t i, int32_t j)
 void mpc_learned_curve(mpc_state *state)
 {
     mpc_learned *const of = &state->learned;
-    mpc_real found[MPC_UNKNOWNS];
+    mpc_wide found[MPC_UNKNOWNS];
     solve(of, found);
-    const mpc_real level = real_clip(found[0], REAL(1.0) - LEVEL_MOST, REAL(1.0) + LEVEL_MOST);
-    const mpc_real tilt = real_clip(found[1], -TILT_MOST, TILT_MOST);
+    const mpc_real level =
+        real_clip((mpc_real)found[0], REAL(1.0) - LEVEL_MOST, REAL(1.0) + LEVEL_MOST);
+    const mpc_real tilt = real_clip((mpc_real)found[1], -TILT_MOST, TILT_MOST);
     mpc_real fuel[MPC_FUEL_PIECES + 1];
     for (int32_t k = 0; k <= MPC_FUEL_PIECES; k++) {
         const mpc_real factor = level + (tilt * place(mpc_par.learned_power_w[k]));
@@ -166,9 +178,9 @@ int32_t mpc_learned_check(const mpc_state *state)
     }
     for (int32_t i = 0; i < MPC_UNKNOWNS; i++) {
         for (int32_t j = 0; j < MPC_UNKNOWNS; j++) {
-            fine &= within(of->square[i][j], -SUM_MOST, SUM_MOST);
+            fine &= is_sum(of->square[i][j]);
         }
-        fine &= within(of->product[i], -SUM_MOST, SUM_MOST);
+        fine &= is_sum(of->product[i]);
     }
     return fine;
 }

@@ -65,6 +65,10 @@ enum {
     MPC_UNKNOWNS = 5 /* level, tilt, and what is late by so many seconds or more */
 };
 
+/* Double in single precision too: sums over a quarter of an hour beside what the map counts in them,
+ * and their determinant, need more digits than a float has. */
+typedef double mpc_wide;
+
 /* What is known of the fuel map, see mpc_learned.c: the last seconds, sums over all before; and the
  * curve that is made of them. Fuel is a share of that at full power. */
 typedef struct {
@@ -72,8 +76,8 @@ typedef struct {
     int32_t void_s;                /* that teach nothing */
     mpc_real fuel[MPC_LATE + 1];   /* the map's, starts included, in the last second and before */
     mpc_real tilted[MPC_LATE + 1]; /* the map's times the place of its power, without starts */
-    mpc_real square[MPC_UNKNOWNS][MPC_UNKNOWNS];
-    mpc_real product[MPC_UNKNOWNS];
+    mpc_wide square[MPC_UNKNOWNS][MPC_UNKNOWNS];
+    mpc_wide product[MPC_UNKNOWNS];
     mpc_real slope[MPC_FUEL_PIECES];
     mpc_real intercept[MPC_FUEL_PIECES];
     mpc_real idle_g_per_s;

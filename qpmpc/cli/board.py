@@ -94,9 +94,13 @@ def read(
     from qpmpc.cli.console import result_console, write_json
     from qpmpc.cli.inputs import check_outputs
     from qpmpc.codegen.board.check import check_log
+    from qpmpc.codegen.board.manifest import NAME as MANIFEST
     from qpmpc.codegen.board.report import board_lines, board_table, write_board
 
     check_outputs(json_file, out)
+    for read_from in (file, folder / MANIFEST):
+        if json_file is not None and json_file.resolve() == read_from.resolve():
+            raise InputError(f"--json {json_file}: would overwrite what is read; name another file")
     result = check_log(folder, file, clock_mhz)
     data = result.summary()
     write_json(data, json_file)

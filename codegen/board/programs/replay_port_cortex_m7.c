@@ -39,7 +39,7 @@
 
 #else
 
-#define NAME "my board" /* YOURS */
+#define NAME "my board" /* YOURS: 1 to 40 letters, digits, spaces, . _ - */
 
 /* YOURS: cycles per second of the core, if `--clock-mhz` did not say it. 0: not known. */
 #ifndef CORE_HZ

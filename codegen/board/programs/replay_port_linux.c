@@ -25,7 +25,8 @@ void port_start(void)
 {
     struct utsname system;
     const char *const machine = (uname(&system) == 0) ? system.machine : "unknown";
-    (void)snprintf(name, sizeof(name), "linux %.30s", machine); /* YOURS: the board's name */
+    /* YOURS: the board's name, 1 to 40 letters, digits, spaces, . _ - */
+    (void)snprintf(name, sizeof(name), "linux %.30s", machine);
 }
 
 uint32_t port_ticks(void)
