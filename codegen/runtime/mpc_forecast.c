@@ -129,7 +129,7 @@ static mpc_swing swing_of(const mpc_forecast *forecast, int32_t first)
 static void find_swings(mpc_forecast *forecast)
 {
     const mpc_real room = mpc_par.soc_max - mpc_par.soc_min;
-    const mpc_real most_j = REAL(0.5) * room * mpc_par.battery_energy_j;
+    const mpc_real most_j = FILLED_SHARE * room * mpc_par.battery_energy_j;
     const mpc_real share = (MPC_CLASSES > 1) ? mpc_par.swing_share : REAL(0.0);
     mpc_swing next = {REAL(0.0), REAL(0.0)};
     for (int32_t block = MPC_BLOCKS - 1; block >= 0; block--) {

@@ -23,8 +23,9 @@ LEAST_KEPT_J = 1.0
 """Tells the end of a block, with however little swing, from a second and from a block passed."""
 DRAIN_SHARE = 0.8
 """Of what driving with the engine off takes out of the battery."""
-FILLED_SHARE = 0.9
-"""Of the battery's energy between its limits: no more is kept free for braking."""
+FILLED_SHARE = 0.5
+"""Of the battery's energy between its limits: no more is kept from either limit. A long descent in
+the cold has no use for more room: the heat that it needs comes from an engine that charges."""
 
 
 def swings(
@@ -66,7 +67,7 @@ def swings(
     following = np.append(own[:, 1:], np.zeros((2, 1)), axis=1)
     battery = vehicle.battery
     room = battery.soc_max - battery.soc_min
-    most = 0.5 * room * BatteryMaps(battery).energy_j(vehicle.trip.soc_mean)
+    most = FILLED_SHARE * room * BatteryMaps(battery).energy_j(vehicle.trip.soc_mean)
     kept: Floats = np.minimum(settings.swing_share * np.maximum(own, following), most)
     return np.maximum(kept, LEAST_KEPT_J)
 
