@@ -123,13 +123,19 @@ static mpc_swing swing_of(const mpc_forecast *forecast, int32_t first)
     return swing;
 }
 
+/* Energy that is kept from an SOC limit at most. */
+static mpc_real most_kept_j(void)
+{
+    const mpc_real room = mpc_par.soc_max - mpc_par.soc_min;
+    return FILLED_SHARE * room * mpc_par.battery_energy_j;
+}
+
 /* At the end of each block: a share of the swing in it and in the next, at most half of the room
  * between the limits and at least something, by which the end of a block is known. An averaged
  * preview knows nothing of the swing. */
 static void find_swings(mpc_forecast *forecast)
 {
-    const mpc_real room = mpc_par.soc_max - mpc_par.soc_min;
-    const mpc_real most_j = FILLED_SHARE * room * mpc_par.battery_energy_j;
+    const mpc_real most_j = most_kept_j();
     const mpc_real share = (MPC_CLASSES > 1) ? mpc_par.swing_share : REAL(0.0);
     mpc_swing next = {REAL(0.0), REAL(0.0)};
     for (int32_t block = MPC_BLOCKS - 1; block >= 0; block--) {
@@ -150,9 +156,7 @@ static mpc_real room_before_j(const mpc_forecast *forecast, int32_t second, mpc_
     const mpc_real internal_w =
         mpc_map_planned_internal_w(battery_side_w(forecast->trip.demand_w[second]));
     const mpc_real taken_w = (internal_w > REAL(0.0)) ? (DRAIN_SHARE * internal_w) : internal_w;
-    const mpc_real most_j = FILLED_SHARE * (mpc_par.soc_max - mpc_par.soc_min)
-                            * mpc_par.battery_energy_j;
-    return real_min(real_max(next_j - taken_w, REAL(0.0)), most_j);
+    return real_min(real_max(next_j - taken_w, REAL(0.0)), most_kept_j());
 }
 
 /* Seconds between two places at which the room is kept. */

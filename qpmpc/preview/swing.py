@@ -65,10 +65,7 @@ def swings(
     is_hard = forecast.demand_w > settings.class_hard_w
     own = np.array([_swing(flow_w[a:b], is_hard[a:b]) for a, b in zip(start, end, strict=True)]).T
     following = np.append(own[:, 1:], np.zeros((2, 1)), axis=1)
-    battery = vehicle.battery
-    room = battery.soc_max - battery.soc_min
-    most = FILLED_SHARE * room * BatteryMaps(battery).energy_j(vehicle.trip.soc_mean)
-    kept: Floats = np.minimum(settings.swing_share * np.maximum(own, following), most)
+    kept: Floats = np.minimum(settings.swing_share * np.maximum(own, following), _most_j(vehicle))
     return np.maximum(kept, LEAST_KEPT_J)
 
 
@@ -95,14 +92,19 @@ def rooms(forecast: Trace, vehicle: Vehicle, settings: HorizonSettings) -> Float
     needed = np.zeros(forecast.steps + 1)
     if settings.classes == 1:
         return needed
-    battery = vehicle.battery
-    energy_j = BatteryMaps(battery).energy_j(vehicle.trip.soc_mean)
-    most = FILLED_SHARE * (battery.soc_max - battery.soc_min) * energy_j
+    most = _most_j(vehicle)
     internal_w = forecast.internal_off_w(vehicle)
     taken_w = np.where(internal_w > 0.0, DRAIN_SHARE * internal_w, internal_w)
     for step in range(forecast.steps - 1, -1, -1):
         needed[step] = min(max(needed[step + 1] - taken_w[step], 0.0), most)
     return needed
+
+
+def _most_j(vehicle: Vehicle) -> float:
+    """Energy that is kept from an SOC limit at most, J."""
+    battery = vehicle.battery
+    room = battery.soc_max - battery.soc_min
+    return FILLED_SHARE * room * BatteryMaps(battery).energy_j(vehicle.trip.soc_mean)
 
 
 def _swing(flow_w: Floats, is_hard: NDArray[np.bool_]) -> tuple[float, float]:

@@ -26,7 +26,7 @@ BEND = 0.1  # tilt at which the breakpoints are chosen
 
 UNKNOWNS = 2 + LATE_S
 WEIGHT = np.array([PRIOR, PRIOR, *[PRIOR_LATE] * LATE_S])  # of the map
-MAP = WEIGHT * np.array([1.0, 0.0, *[0.0] * LATE_S])
+MAP = WEIGHT * np.eye(UNKNOWNS)[0]  # level 1
 
 
 class LearnedFuel:
