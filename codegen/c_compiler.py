@@ -20,6 +20,7 @@ FLAGS = f"{COMPILE} -shared -Wl,-Bsymbolic"
 RELOCATABLE = f"{COMPILE} -r -nostdlib"
 DATA = "mpc_data.c"
 NEEDS_NONE = "mh_qp.implementation=python needs none"
+ADVICE = f"; {NEEDS_NONE}"
 
 
 class CodegenError(QpmpcError):
@@ -38,12 +39,15 @@ def version(command: str, size: int, modified_ns: int) -> bytes:
     return subprocess.run([command, "--version"], capture_output=True, check=False).stdout
 
 
-def library_of(command: str, files: Mapping[str, str], common: Path | None = None) -> bytes:
+def library_of(
+    command: str, files: Mapping[str, str], common: Path | None = None, hidden: bool = False
+) -> bytes:
     """Return the content of the shared library of all sources, by name.
 
     Parameters
     ----------
     common : object made by `common_object`; only `DATA` is then compiled
+    hidden : whether only what the sources mark as exported is visible outside, as in an FMU
 
     Raises
     ------
@@ -52,7 +56,9 @@ def library_of(command: str, files: Mapping[str, str], common: Path | None = Non
     """
     objects = [] if common is None else [str(common)]
     sources = _sources(files) if common is None else [DATA]
-    return _made(command, files, [*FLAGS.split(), *objects, *sources, "-lm"])
+    visible = ["-fvisibility=hidden"] if hidden else []
+    advice = "" if hidden else ADVICE
+    return _made(command, files, [*FLAGS.split(), *visible, *objects, *sources, "-lm"], advice)
 
 
 def common_object(command: str, files: Mapping[str, str]) -> bytes:
@@ -71,7 +77,9 @@ def _sources(files: Mapping[str, str]) -> list[str]:
     return sorted(name for name in files if name.endswith(".c"))
 
 
-def _made(command: str, files: Mapping[str, str], arguments: list[str]) -> bytes:
+def _made(
+    command: str, files: Mapping[str, str], arguments: list[str], advice: str = ADVICE
+) -> bytes:
     """Write what the sources among the arguments may need, compile, and return what was made."""
     try:
         with tempfile.TemporaryDirectory() as scratch:
@@ -91,8 +99,8 @@ def _made(command: str, files: Mapping[str, str], arguments: list[str]) -> bytes
             made = folder / "made"
             content = made.read_bytes() if made.exists() and not result.returncode else b""
     except OSError as error:
-        raise CodegenError(f"C compiler {command} cannot be run: {error}; {NEEDS_NONE}") from error
+        raise CodegenError(f"C compiler {command} cannot be run: {error}{advice}") from error
     if not content:
         first = next(iter(result.stderr.strip().splitlines()), "no library was built")
-        raise CodegenError(f"C compiler {command} failed: {first}; {NEEDS_NONE}")
+        raise CodegenError(f"C compiler {command} failed: {first}{advice}")
     return content

@@ -13,6 +13,7 @@ from qpmpc.cli.codegen import codegen
 from qpmpc.cli.compare import compare
 from qpmpc.cli.convert import convert
 from qpmpc.cli.cycles import cycles
+from qpmpc.cli.fmu import fmu
 from qpmpc.cli.pil import pil
 from qpmpc.cli.reproduce import reproduce
 from qpmpc.cli.simulate import simulate
@@ -42,6 +43,7 @@ app.command()(compare)
 app.command()(benchmark)
 app.command()(codegen)
 app.command()(pil)
+app.command()(fmu)
 app.command()(reproduce)
 app.command()(verify)
 app.command()(sweep)

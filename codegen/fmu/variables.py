@@ -1,0 +1,259 @@
+"""The variables of an FMU: what goes in and out each second, with units and limits."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from qpmpc.vehicle.capability import Capability
+from qpmpc.vehicle.engine import optimal_line
+from qpmpc.vehicle.parameters import Vehicle
+
+Kind = Literal["real", "integer", "boolean"]
+Role = Literal["independent", "parameter", "input", "output"]
+
+LAST_FLAG = 32  # of mpc_out.flags
+LAST_RUNG = 2
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One variable of an FMU; its value reference is its place in the list.
+
+    Attributes
+    ----------
+    name : in Python, C and the FMU
+    role : what FMI calls causality
+    description : in one line
+    kind : of its values
+    unit : one of `qpmpc.codegen.fmu.units.UNITS`; none for integers and booleans
+    start : before the first second
+    low, high : least and greatest value that has a meaning, if there are such
+    display : unit in which a tool may show it
+    follows : whether it follows from inputs at once, without a step between
+    at_start : parameters that an output has its first value from; None if that is `start`
+    continuous : whether it is sampled from something that changes steadily; others are held
+    """
+
+    name: str
+    role: Role
+    description: str
+    kind: Kind = "real"
+    unit: str | None = None
+    start: float = 0.0
+    low: float | None = None
+    high: float | None = None
+    display: str | None = None
+    follows: bool = False
+    at_start: tuple[str, ...] | None = None
+    continuous: bool = False
+
+
+TIME = Variable("time", "independent", "Time", unit="s", continuous=True)
+
+
+def controller_variables(vehicle: Vehicle, learning: bool, certificate: bool) -> list[Variable]:
+    """Return the variables of a controller.
+
+    Parameters
+    ----------
+    vehicle : that it is made for
+    learning : whether it reads the fuel injected
+    certificate : whether its plan comes with a proof of how good it is
+    """
+    trip = vehicle.trip
+    can = Capability.of(vehicle, optimal_line(vehicle.engine))
+    fuel = Variable(
+        "fuel_g", "input", "Measured fuel injected in the last second", unit="g", low=0.0
+    )
+    quality = (
+        Variable(
+            "certificate_g",
+            "output",
+            "Fuel by which the plan of this second may at most be improved, proven; 0 without a "
+            "new plan",
+            unit="g",
+            low=0.0,
+            follows=True,
+        )
+        if certificate
+        else Variable(
+            "relaxation_gap",
+            "output",
+            "Relative slack of the plan's relaxed curves: 0 where the plan is exact; 0 too without "
+            "a new plan",
+            unit="1",
+            follows=True,
+        )
+    )
+    return [
+        TIME,
+        _soc("input", "Measured state of charge of the battery", trip.soc_init),
+        Variable(
+            "t_cl_degc",
+            "input",
+            "Measured coolant temperature",
+            unit="degC",
+            start=trip.t_cl_init_degc,
+            low=can.coldest_degc,
+            high=can.hottest_degc,
+            continuous=True,
+        ),
+        *_road("input", can),
+        _engine_on("input"),
+        *([fuel] if learning else []),
+        *_command("output", vehicle),
+        Variable(
+            "on_share",
+            "output",
+            "Share of the coming second for which the plan has the engine on; 0 without a new plan",
+            unit="1",
+            low=0.0,
+            high=1.0,
+            follows=True,
+        ),
+        quality,
+        Variable(
+            "rung",
+            "output",
+            "Where the command comes from: 0 plan of this second, 1 earlier plan, 2 rules",
+            kind="integer",
+            low=0,
+            high=LAST_RUNG,
+            follows=True,
+        ),
+        Variable(
+            "flags",
+            "output",
+            "What was wrong in this second, a sum of: 1 measurement, 2 preview, 4 solver, 8 "
+            "warming up, 16 clock, 32 memory",
+            kind="integer",
+            low=0,
+            high=2 * LAST_FLAG - 1,
+            follows=True,
+        ),
+    ]
+
+
+def plant_variables(vehicle: Vehicle, with_trip: bool) -> list[Variable]:
+    """Return the variables of the plant; with a trip, demand and speed are outputs."""
+    trip = vehicle.trip
+    can = Capability.of(vehicle, optimal_line(vehicle.engine))
+    return [
+        TIME,
+        Variable(
+            "soc_init",
+            "parameter",
+            "State of charge at departure",
+            unit="1",
+            start=trip.soc_init,
+            low=0.0,
+            high=1.0,
+            display="%",
+        ),
+        Variable(
+            "t_cl_init_degc",
+            "parameter",
+            "Coolant temperature at departure",
+            unit="degC",
+            start=trip.t_cl_init_degc,
+            low=can.coldest_degc,
+            high=can.hottest_degc,
+        ),
+        *_command("input", vehicle),
+        *_road("output" if with_trip else "input", can),
+        _soc("output", "State of charge of the battery", trip.soc_init, ("soc_init",)),
+        Variable(
+            "t_cl_degc",
+            "output",
+            "Coolant temperature",
+            unit="degC",
+            start=trip.t_cl_init_degc,
+            low=can.coldest_degc,
+            high=can.hottest_degc,
+            at_start=("t_cl_init_degc",),
+            continuous=True,
+        ),
+        _engine_on("output"),
+        Variable("fuel_g", "output", "Fuel injected in the last second", unit="g", low=0.0),
+        Variable("fuel_total_g", "output", "Fuel injected since departure", unit="g", low=0.0),
+        _power("p_eng_w", "Power of the engine in the last second", 0.0, vehicle),
+        _power("p_bat_w", "Power of the battery at its terminals, negative while it is charged"),
+        _power("p_friction_w", "Power of the friction brakes, as the battery would see it", 0.0),
+        _power("p_missing_w", "Demand that neither engine nor battery could meet"),
+        _power("power_excess_w", "Excess of the command over engine or battery limits", 0.0),
+    ]
+
+
+def _power(
+    name: str, description: str, low: float | None = None, vehicle: Vehicle | None = None
+) -> Variable:
+    high = None if vehicle is None else vehicle.engine.power_max_w
+    return Variable(name, "output", description, unit="W", low=low, high=high, display="kW")
+
+
+def _soc(
+    role: Role, description: str, start: float, at_start: tuple[str, ...] | None = None
+) -> Variable:
+    return Variable(
+        "soc",
+        role,
+        description,
+        unit="1",
+        start=start,
+        low=0.0,
+        high=1.0,
+        display="%",
+        at_start=at_start,
+        continuous=True,
+    )
+
+
+def _road(role: Role, can: Capability) -> list[Variable]:
+    from_trip = () if role == "output" else None
+    return [
+        Variable(
+            "demand_w",
+            role,
+            "Power demand of the coming second at battery and engine, negative when braking",
+            unit="W",
+            low=can.demand_min_w,
+            high=can.demand_max_w,
+            display="kW",
+            at_start=from_trip,
+        ),
+        Variable(
+            "speed_mps",
+            role,
+            "Mean speed of the coming second",
+            unit="m/s",
+            low=0.0,
+            high=can.speed_max_mps,
+            display="km/h",
+            at_start=from_trip,
+        ),
+    ]
+
+
+def _engine_on(role: Role) -> Variable:
+    return Variable("engine_on", role, "Whether the engine ran in the last second", kind="boolean")
+
+
+def _command(role: Role, vehicle: Vehicle) -> list[Variable]:
+    return [
+        Variable(
+            "engine_on_command",
+            role,
+            "Command of the second: whether the engine runs",
+            kind="boolean",
+            follows=role == "output",
+        ),
+        Variable(
+            "p_eng_command_w",
+            role,
+            "Command of the second: power of the engine, 0 with the engine off",
+            unit="W",
+            low=0.0,
+            high=vehicle.engine.power_max_w,
+            display="kW",
+            follows=role == "output",
+        ),
+    ]

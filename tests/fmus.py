@@ -1,0 +1,98 @@
+"""FMUs opened by FMPy: values by name, steps of one second, what was logged."""
+
+import shutil
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import fmpy
+from fmpy import fmi2, fmi3
+
+GETTERS = {"Real": "Real", "Float64": "Float64", "Integer": "Integer", "Int32": "Int32"}
+
+
+class Unit:
+    """An instance of an FMU.
+
+    Attributes
+    ----------
+    logged : messages, newest last
+    """
+
+    def __init__(self, file: Path, unpacked: Path | None = None, name: str = "one") -> None:
+        self.description = fmpy.read_model_description(file)
+        self._own = None if unpacked else fmpy.extract(file)
+        self._variables = {v.name: v for v in self.description.modelVariables}
+        self.logged: list[str] = []
+        self.is_fmi3 = self.description.fmiVersion == "3.0"
+        arguments = {
+            "guid": self.description.guid,
+            "modelIdentifier": self.description.coSimulation.modelIdentifier,
+            "unzipDirectory": str(unpacked or self._own),
+            "instanceName": name,
+        }
+        if self.is_fmi3:
+            self.fmu: Any = fmi3.FMU3Slave(**arguments)
+            self._log3 = fmi3.fmi3LogMessageCallback(
+                lambda _, status, category, message: self.logged.append(message.decode())
+            )
+            self.fmu.instantiate(logMessage=self._log3)
+        else:
+            self.fmu = fmi2.FMU2Slave(**arguments)
+            self._log2 = fmi2.fmi2CallbackLoggerTYPE(
+                lambda _, instance, status, category, message: self.logged.append(message.decode())
+            )
+            callbacks = fmi2.fmi2CallbackFunctions()
+            callbacks.logger = self._log2
+            callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+            callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
+            self.fmu.instantiate(callbacks=callbacks)
+            self._callbacks = callbacks
+        self.logged.clear()
+
+    def __enter__(self) -> "Unit":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.fmu.freeInstance()
+        if self._own:
+            shutil.rmtree(self._own, ignore_errors=True)
+
+    def start(self, start_s: float = 0.0, **values: float) -> "Unit":
+        """Initialise, with these inputs and parameters."""
+        if self.is_fmi3:
+            self.set(**values)
+            self.fmu.enterInitializationMode(startTime=start_s)
+        else:
+            self.fmu.setupExperiment(startTime=start_s)
+            self.fmu.enterInitializationMode()
+            self.set(**values)
+        self.fmu.exitInitializationMode()
+        return self
+
+    def get(self, *names: str) -> list[float]:
+        """Return values by name."""
+        return [self._call("get", name)[0] for name in names]
+
+    def set(self, **values: float) -> None:
+        """Set values by name."""
+        for name, value in values.items():
+            self._call("set", name, [value])
+
+    def _call(self, what: str, name: str, *values: Any) -> Any:
+        variable = self._variables[name]
+        method = getattr(self.fmu, f"{what}{GETTERS.get(variable.type, variable.type)}")
+        return method([variable.valueReference], *values)
+
+    def step(self, at_s: float, step_s: float = 1.0) -> Any:
+        """Advance."""
+        return self.fmu.doStep(currentCommunicationPoint=at_s, communicationStepSize=step_s)
+
+
+def connect(source: Unit, target: Unit, names: Iterable[str]) -> None:
+    """Carry values from the outputs of one unit to the inputs of another, of the same names."""
+    target.set(**dict(zip(names, source.get(*names), strict=True)))
+
+
+TO_CONTROLLER = ("soc", "t_cl_degc", "demand_w", "speed_mps", "engine_on")
+TO_PLANT = ("engine_on_command", "p_eng_command_w")
