@@ -19,18 +19,19 @@ class Unit:
     logged : messages, newest last
     """
 
-    def __init__(self, file: Path, unpacked: Path | None = None, name: str = "one") -> None:
-        self.description = fmpy.read_model_description(file)
+    def __init__(self, file: Path, unpacked: str | None = None, **arguments: Any) -> None:
+        self.file, self.description = file, fmpy.read_model_description(file)
         self._own = None if unpacked else fmpy.extract(file)
+        self._unpacked = unpacked or self._own
         self._variables = {v.name: v for v in self.description.modelVariables}
         self.logged: list[str] = []
         self.is_fmi3 = self.description.fmiVersion == "3.0"
         arguments = {
             "guid": self.description.guid,
             "modelIdentifier": self.description.coSimulation.modelIdentifier,
-            "unzipDirectory": str(unpacked or self._own),
-            "instanceName": name,
-        }
+            "unzipDirectory": self._unpacked,
+            "instanceName": "one",
+        } | arguments
         if self.is_fmi3:
             self.fmu: Any = fmi3.FMU3Slave(**arguments)
             self._log3 = fmi3.fmi3LogMessageCallback(
@@ -58,6 +59,23 @@ class Unit:
         if self._own:
             shutil.rmtree(self._own, ignore_errors=True)
 
+    def beside(self) -> "Unit":
+        """Return another instance, of the same loaded library."""
+        return Unit(self.file, self._unpacked, instanceName="another")
+
+    def state(self) -> Any:
+        """Return a copy of all that changes."""
+        return self.fmu.getFMUState() if self.is_fmi3 else self.fmu.getFMUstate()
+
+    def restore(self, state: Any) -> None:
+        """Go back to a copy, which is then freed."""
+        if self.is_fmi3:
+            self.fmu.setFMUState(state)
+            self.fmu.freeFMUState(state)
+        else:
+            self.fmu.setFMUstate(state)
+            self.fmu.freeFMUstate(state)
+
     def start(self, start_s: float = 0.0, **values: float) -> "Unit":
         """Initialise, with these inputs and parameters."""
         if self.is_fmi3:
@@ -79,6 +97,10 @@ class Unit:
         for name, value in values.items():
             self._call("set", name, [value])
 
+    def reference(self, name: str) -> int:
+        """Return a value reference."""
+        return int(self._variables[name].valueReference)
+
     def _call(self, what: str, name: str, *values: Any) -> Any:
         variable = self._variables[name]
         method = getattr(self.fmu, f"{what}{GETTERS.get(variable.type, variable.type)}")
@@ -94,5 +116,6 @@ def connect(source: Unit, target: Unit, names: Iterable[str]) -> None:
     target.set(**dict(zip(names, source.get(*names), strict=True)))
 
 
+CONTROLLERS = {"2": "mh-qp", "3": "mh-costate"}  # that the tests export, by version of FMI
 TO_CONTROLLER = ("soc", "t_cl_degc", "demand_w", "speed_mps", "engine_on")
 TO_PLANT = ("engine_on_command", "p_eng_command_w")

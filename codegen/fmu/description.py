@@ -70,8 +70,10 @@ def model_description(
     categories = SubElement(root, "LogCategories")
     for name, text in LOGGED.items():
         SubElement(categories, "Category", name=name, description=text)
-    of_trip = {} if about.trip_s is None else {"stopTime": str(about.trip_s)}
-    SubElement(root, "DefaultExperiment", startTime="0", **of_trip, stepSize="1")
+    experiment = {"startTime": "0", "stepSize": "1"}
+    if about.trip_s is not None:
+        experiment["stopTime"] = str(about.trip_s)
+    SubElement(root, "DefaultExperiment", experiment)
     listed = SubElement(root, "ModelVariables")
     for reference, variable in enumerate(variables):
         _add_variable(listed, fmi, reference, variable)

@@ -14,12 +14,13 @@ typedef struct {
 static const char *const categories[] = {"", "logStatusWarning", "logStatusDiscard",
                                          "logStatusError"};
 
-/* Warnings and errors are logged whether debug logging is on or off: there is no other kind. */
+/* Messages are formats of printf here, and ours hold no percent sign. Some importers do not expand
+ * them. Warnings and errors are logged whether debug logging is on or off: there is no other kind. */
 static fmi2Status told(instance *of, int32_t status)
 {
     if ((status != MPC_FMU_OK) && (of->functions.logger != NULL)) {
         of->functions.logger(of->functions.componentEnvironment, of->name, (fmi2Status)status,
-                             categories[status], "%s", of->fmu.message);
+                             categories[status], of->fmu.message);
     }
     return (fmi2Status)status;
 }
@@ -49,7 +50,7 @@ static fmi2Component not_made(const fmi2CallbackFunctions *functions, fmi2String
 {
     if ((functions != NULL) && (functions->logger != NULL)) {
         functions->logger(functions->componentEnvironment, name, fmi2Error, categories[fmi2Error],
-                          "%s", why);
+                          why);
     }
     return NULL;
 }

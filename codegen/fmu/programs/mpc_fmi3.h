@@ -43,6 +43,21 @@ typedef void (*fmi3IntermediateUpdateCallback)(fmi3InstanceEnvironment environme
                                                fmi3Float64 time, fmi3Boolean set, fmi3Boolean get,
                                                fmi3Boolean done, fmi3Boolean early,
                                                fmi3Boolean *wanted, fmi3Float64 *at);
+typedef void (*fmi3ClockUpdateCallback)(fmi3InstanceEnvironment environment);
+typedef void (*fmi3LockPreemptionCallback)(void);
+typedef enum {
+    fmi3Independent,
+    fmi3Constant,
+    fmi3Fixed,
+    fmi3Tunable,
+    fmi3Discrete,
+    fmi3Dependent
+} fmi3DependencyKind;
+typedef enum {
+    fmi3IntervalNotYetKnown,
+    fmi3IntervalUnchanged,
+    fmi3IntervalChanged
+} fmi3IntervalQualifier;
 
 /* Logs why a call is refused; returns fmi3Error. */
 fmi3Status mpc_fmi3_refuse(fmi3Instance c, const char *why);

@@ -6,22 +6,6 @@
 #pragma GCC diagnostic ignored "-Wunused-parameter" /* nearly all of them */
 #endif
 
-typedef void (*fmi3ClockUpdateCallback)(fmi3InstanceEnvironment environment);
-typedef void (*fmi3LockPreemptionCallback)(void);
-typedef enum {
-    fmi3Independent,
-    fmi3Constant,
-    fmi3Fixed,
-    fmi3Tunable,
-    fmi3Discrete,
-    fmi3Dependent
-} fmi3DependencyKind;
-typedef enum {
-    fmi3IntervalNotYetKnown,
-    fmi3IntervalUnchanged,
-    fmi3IntervalChanged
-} fmi3IntervalQualifier;
-
 /* Of a type that no variable has: nothing to get or set is fine. */
 #define NO_TYPE(NAME_GET, NAME_SET, TYPE)                                                          \
     STATUS NAME(NAME_GET)(fmi3Instance c, const fmi3ValueReference vr[], size_t count,             \

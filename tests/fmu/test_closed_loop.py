@@ -1,0 +1,121 @@
+"""Two FMUs in a loop are `qpmpc simulate`; instances do not know of each other."""
+
+import numpy as np
+import pytest
+from fmpy.validation import validate_fmu
+from fmus import CONTROLLERS, TO_CONTROLLER, TO_PLANT, Unit, connect
+
+from qpmpc import simulate
+
+SHOWN = ("soc", "t_cl_degc", "fuel_g", "p_eng_w", "p_bat_w")
+
+
+class Loop:
+    """A controller and a plant; `asks` is a master that reads outputs before it steps anything."""
+
+    def __init__(self, controller: Unit, plant: Unit, asks: bool = False, **initial: float) -> None:
+        self.controller, self.plant, self.asks = controller, plant, asks
+        plant.start(**initial)
+        controller.start(**dict(zip(TO_CONTROLLER, plant.get(*TO_CONTROLLER), strict=True)))
+
+    def second(self, at: int) -> list[float]:
+        """Drive one second; what the plant shows then, and the controller's command."""
+        connect(self.plant, self.controller, TO_CONTROLLER)
+        if self.asks:
+            connect(self.controller, self.plant, TO_PLANT)
+            self.plant.step(at)
+            self.controller.step(at)
+        else:
+            self.controller.step(at)
+            connect(self.controller, self.plant, TO_PLANT)
+            self.plant.step(at)
+        return [*self.plant.get(*SHOWN), *self.controller.get("p_eng_command_w", "flags", "rung")]
+
+
+@pytest.mark.parametrize("what", ["controller2", "plant2", "controller3", "plant3"])
+def test_it_is_valid(fmus, what):
+    assert validate_fmu(str(fmus[what])) == []
+
+
+@pytest.mark.parametrize("asks", [False, True], ids=["stepped in order", "asked, then stepped"])
+@pytest.mark.parametrize("fmi", ["2", "3"])
+def test_two_fmus_are_simulate(fmus, trip, fmi, asks):
+    """To rounding: the previews' sums are made in another order, and the plant's arithmetic."""
+    run = simulate(trip, CONTROLLERS[fmi]).trajectory
+    with Unit(fmus[f"controller{fmi}"]) as controller, Unit(fmus[f"plant{fmi}"]) as plant:
+        loop = Loop(controller, plant, asks)
+        found = np.array([loop.second(t) for t in range(trip.steps)])
+        assert controller.get("time") == [trip.steps]
+        assert plant.get("fuel_total_g")[0] == pytest.approx(run.fuel_g.sum(), rel=1e-9)
+        assert plant.get("demand_w", "speed_mps") == [0.0, 0.0]
+        assert controller.logged == plant.logged == []
+    assert run.fuel_g.sum() > 50.0
+    expected = np.column_stack(
+        [run.soc[1:], run.t_cl_degc[1:], run.fuel_g, run.p_eng_w, run.p_bat_w, run.p_eng_w]
+    )
+    unit = np.array([1.0, 100.0, 1.0, 1e4, 1e4, 1e4])  # what 1e-5 is meant of
+    assert np.abs((found[:, :6] - expected) / unit).max() < 1e-8
+    assert not found[:, 6:].any()
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
+def test_instances_side_by_side_are_as_alone(fmus, fmi):
+    """Bit by bit, and the two trips differ."""
+    controller, plant = fmus[f"controller{fmi}"], fmus[f"plant{fmi}"]
+    initial = ({"soc_init": 0.6}, {"soc_init": 0.52, "t_cl_init_degc": 30.0})
+    seconds = range(120)
+    alone = []
+    for values in initial:
+        with Unit(controller) as c, Unit(plant) as p:
+            loop = Loop(c, p, **values)
+            alone.append([loop.second(t) for t in seconds])
+    assert alone[0] != alone[1]
+    with Unit(controller) as c, Unit(plant) as p:
+        units = (c.beside(), p.beside())
+        with units[0], units[1]:
+            loops = [Loop(c, p, **initial[0]), Loop(*units, **initial[1])]
+            together = list(
+                zip(*([loop.second(t) for loop in loops] for t in seconds), strict=True)
+            )
+    assert [list(each) for each in together] == alone
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
+def test_reset_is_as_new(fmus, fmi):
+    with Unit(fmus[f"controller{fmi}"]) as c, Unit(fmus[f"plant{fmi}"]) as p:
+        loop = Loop(c, p, soc_init=0.5)
+        first = [loop.second(t) for t in range(30)]
+        c.fmu.reset()
+        p.fmu.reset()
+        assert p.get("soc", "time") == [0.6, 0.0]
+        loop = Loop(c, p, soc_init=0.5)
+        again = [loop.second(t) for t in range(30)]
+    assert first == again
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
+def test_a_saved_state_brings_all_back(fmus, fmi):
+    with Unit(fmus[f"controller{fmi}"]) as c, Unit(fmus[f"plant{fmi}"]) as p:
+        loop = Loop(c, p)
+        for t in range(100):
+            loop.second(t)
+        saved = [unit.state() for unit in (c, p)]
+        first = [loop.second(t) for t in range(100, 140)]
+        for unit, state in zip((c, p), saved, strict=True):
+            unit.restore(state)
+        assert [loop.second(t) for t in range(100, 140)] == first
+
+
+def test_a_question_asked_twice_in_a_second_is_one_decision(fmus):
+    """Outputs follow the inputs as often as these change; the last counts."""
+    with Unit(fmus["controller2"]) as c, Unit(fmus["plant2"]) as p:
+        loop = Loop(c, p, asks=True)
+        once = [loop.second(t) for t in range(40)]
+    with Unit(fmus["controller2"]) as c, Unit(fmus["plant2"]) as p:
+        loop = Loop(c, p, asks=True)
+        twice = []
+        for t in range(40):
+            c.set(soc=0.45, demand_w=20e3)
+            c.get("p_eng_command_w")
+            twice.append(loop.second(t))
+    assert once == twice
