@@ -1,6 +1,7 @@
 """An FMU as a file: sources, library of this machine, descriptions; same input, same sources."""
 
 import hashlib
+import os
 import platform
 import sys
 from collections.abc import Mapping
@@ -43,7 +44,7 @@ def checked_name(file: Path) -> str:
     return file.stem
 
 
-def export_fmu(part: Part, file: Path, fmi: Fmi = "2") -> str:
+def export_fmu(part: Part, file: str | os.PathLike[str], fmi: Fmi = "2") -> str:
     """Write an FMU for co-simulation, with its sources and a library for this machine.
 
     Parameters
@@ -63,7 +64,8 @@ def export_fmu(part: Part, file: Path, fmi: Fmi = "2") -> str:
     CodegenError
         If there is no C compiler, or it fails.
     """
-    identifier = checked_name(file)
+    path = Path(file)
+    identifier = checked_name(path)
     sources = _sources(part, fmi)
     about = About(identifier, identifier, part.description, _token(part, sources, fmi), part.trip_s)
     sources |= _variables(part, about)
@@ -78,7 +80,7 @@ def export_fmu(part: Part, file: Path, fmi: Fmi = "2") -> str:
     }
     if fmi == "3":
         content["sources/buildDescription.xml"] = build_description(identifier, names)
-    write_bytes(file, _archive(content))
+    write_bytes(path, _archive(content))
     return folder
 
 

@@ -48,16 +48,24 @@ class Part:
 
 
 def controller_part(
-    trip: Trip, settings: ControllerSettings, controller: Generated, precision: Precision
+    trip: Trip,
+    controller: Generated = "mh-qp",
+    settings: ControllerSettings | None = None,
+    precision: Precision = "f64",
 ) -> Part:
     """Return a generated controller that knows its trip.
+
+    Parameters
+    ----------
+    trip : its forecast is the preview
+    controller, settings, precision : to be generated
 
     Raises
     ------
     InputError
         If the settings do not fit generated code.
     """
-    method = Method.of(controller, settings)
+    method = Method.of(controller, settings or ControllerSettings())
     values = method.values(trip.vehicle, method.horizon.block_count(trip.forecast.steps))
     files = project_files(values, "host", precision)
     sources = {n: t for n, t in files.items() if n.endswith((".c", ".h")) and not is_example(n)}
@@ -75,8 +83,8 @@ def controller_part(
     )
 
 
-def plant_part(vehicle: Vehicle, trip: Trip | None) -> Part:
-    """Return the plant of a vehicle; with a trip it drives that."""
+def plant_part(vehicle: Vehicle, trip: Trip | None = None) -> Part:
+    """Return the plant of a vehicle; with a trip it drives that, whose vehicle must be the same."""
     sources = _programs(OF_PLANT)
     sources["mpc_plant_data.h"] = _numbers(vehicle)
     sources["mpc_fmu_trip.h"] = (

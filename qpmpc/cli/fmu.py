@@ -86,7 +86,7 @@ def fmu(
     if of_part == "plant" or trip is None:
         made = plant_part(car, trip)
     else:
-        made = controller_part(trip, settings, name, of_precision)
+        made = controller_part(trip, name, settings, of_precision)
     platform = export_fmu(made, file, of_fmi)
     console = result_console()
     console.print(

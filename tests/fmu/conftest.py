@@ -1,4 +1,4 @@
-"""FMUs of controller and plant, exported once for the tests of this folder."""
+"""FMUs of controller and plant, exported once for the tests of a file."""
 
 from pathlib import Path
 
@@ -7,7 +7,6 @@ import pytest
 from qpmpc.codegen.c_compiler import compiler
 from qpmpc.codegen.fmu.export import export_fmu
 from qpmpc.codegen.fmu.parts import controller_part, plant_part
-from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.trip import Trip
 
 pytest.importorskip("fmpy", reason="not installed: fmpy, which simulates FMUs")
@@ -20,19 +19,26 @@ def trip() -> Trip:
     return Trip("nycc")
 
 
+class Exported(dict[str, Path]):
+    """FMUs by part and version of FMI, `controller2`, `plant3`: made when one is asked for."""
+
+    def __init__(self, folder: Path, trip: Trip) -> None:
+        self.folder, self.trip = folder, trip
+
+    def __missing__(self, name: str) -> Path:
+        part, fmi = name[:-1], name[-1]
+        made = (
+            controller_part(self.trip, CONTROLLERS[fmi])
+            if part == "controller"
+            else plant_part(self.trip.vehicle, self.trip)
+        )
+        self[name] = self.folder / f"{name}.fmu"
+        export_fmu(made, self[name], fmi)
+        return self[name]
+
+
 @pytest.fixture(scope="session")
-def fmus(tmp_path_factory: pytest.TempPathFactory, trip: Trip) -> dict[str, Path]:
-    """Controller and plant by version of FMI: controller2, plant2, controller3, plant3."""
+def fmus(tmp_path_factory: pytest.TempPathFactory, trip: Trip) -> Exported:
     if compiler() is None:
         pytest.skip("no C compiler on this machine")
-    folder = tmp_path_factory.mktemp("fmus")
-    files = {}
-    for fmi, name in CONTROLLERS.items():
-        parts = {
-            "controller": controller_part(trip, ControllerSettings(), name, "f64"),
-            "plant": plant_part(trip.vehicle, trip),
-        }
-        for what, part in parts.items():
-            file = files[f"{what}{fmi}"] = folder / f"{what}{fmi}.fmu"
-            export_fmu(part, file, fmi)
-    return files
+    return Exported(tmp_path_factory.mktemp("fmus"), trip)

@@ -119,3 +119,19 @@ def test_a_question_asked_twice_in_a_second_is_one_decision(fmus):
             c.get("p_eng_command_w")
             twice.append(loop.second(t))
     assert once == twice
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
+def test_a_controller_without_a_measurement_warns_and_says_what_drives(fmus, fmi):
+    with Unit(fmus[f"controller{fmi}"]) as unit:
+        unit.start(soc=float("nan"))
+        assert unit.logged == [
+            "no plan before the trip, because of an input out of range at the start: the rules "
+            "drive first"
+        ]
+        unit.step(0)
+        (flags,) = unit.get("flags")
+        assert flags & 1  # a bad measurement
+        unit.set(soc=0.6)
+        unit.step(1)
+        assert not unit.get("flags")[0] & 1

@@ -41,7 +41,7 @@ def test_step_by_step(tmp_path, name, settings):
     """To rounding, which grows where the battery's current is a difference of equal numbers."""
     vehicle = load_vehicle(name).with_settings(settings)
     file = tmp_path / "plant.fmu"
-    export_fmu(plant_part(vehicle, None), file, "2")
+    export_fmu(plant_part(vehicle), file, "2")
     assert validate_fmu(str(file)) == []
     plant, seen = Plant(vehicle), set()
     with Unit(file) as unit:
@@ -72,7 +72,7 @@ def test_step_by_step(tmp_path, name, settings):
 def test_a_number_that_is_none_is_refused(tmp_path_factory, name, value):
     file = tmp_path_factory.getbasetemp() / "refuses.fmu"
     if not file.exists():
-        export_fmu(plant_part(load_vehicle("prius-nimh"), None), file, "2")
+        export_fmu(plant_part(load_vehicle("prius-nimh")), file, "2")
     with Unit(file) as unit:
         unit.start()
         unit.set(**{name: value})

@@ -105,7 +105,7 @@ void mpc_plant_step(mpc_plant_state *state, const mpc_plant_asked *asked, mpc_pl
         const double most_w = real_min(plant_engine_max_w, before_w + plant_ramp_w_per_s);
         p_eng_w = clipped(asked->p_command_w, plant_engine_min_w, most_w);
     }
-    const double cranking_w = (starts != 0) ? plant_start_energy_j : 0.0;
+    const double cranking_w = (double)starts * plant_start_energy_j;
     double p_bat_w = ((asked->demand_w + plant_aux_power_w) + cranking_w) - p_eng_w;
     const double accepted_w = charge_limit_w(state->soc);
     double friction_w = 0.0;
@@ -124,7 +124,7 @@ void mpc_plant_step(mpc_plant_state *state, const mpc_plant_asked *asked, mpc_pl
     if (on != 0) {
         const double hot_g = at(plant_line_power_w, plant_fuel_g_per_s, PLANT_FUEL_POINTS, p_eng_w);
         fuel_g = cold_factor(state->t_cl_degc) * hot_g;
-        fuel_g += (starts != 0) ? plant_start_fuel_g : 0.0;
+        fuel_g += (double)starts * plant_start_fuel_g;
     }
     const double fuel_w = (fuel_g * plant_lhv_j_per_kg) * 1e-3;
     const double heat_w = coolant_w(state->t_cl_degc, asked->speed_mps, fuel_w, p_eng_w);
