@@ -120,12 +120,13 @@ def _library(sources: Mapping[str, str]) -> bytes:
 
 
 def _platform(fmi: Fmi) -> tuple[str, str]:
-    """Return the folder and the suffix of a library for this machine."""
+    """Return the folder and the suffix of a library for this machine.
+
+    FMI 2.0 has no name for the processor; FMPy looks into the same folder on each.
+    """
     machine = platform.machine().lower().replace("arm64", "aarch64").replace("amd64", "x86_64")
     system, suffix = ("darwin", ".dylib") if sys.platform == "darwin" else ("linux", ".so")
-    if fmi == "2" and machine == "x86_64":
-        return f"{system}64", suffix
-    return f"{machine}-{system}", suffix
+    return (f"{system}64" if fmi == "2" else f"{machine}-{system}"), suffix
 
 
 def _archive(content: Mapping[str, bytes]) -> bytes:

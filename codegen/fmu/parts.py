@@ -11,11 +11,13 @@ from qpmpc.codegen.generate import Precision, literals, project_files, template_
 from qpmpc.codegen.method import Generated, Method
 from qpmpc.codegen.rows.c_text import Writer
 from qpmpc.controllers.settings import ControllerSettings
+from qpmpc.errors import InputError
 from qpmpc.preview.forecast import Trace
 from qpmpc.shown import shown
 from qpmpc.trip import Trip
 from qpmpc.vehicle import heat
 from qpmpc.vehicle.battery import BatteryMaps
+from qpmpc.vehicle.capability import Capability
 from qpmpc.vehicle.engine import optimal_line
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.plant import BOILING_DEGC, POWER_TOLERANCE_W
@@ -63,8 +65,9 @@ def controller_part(
     Raises
     ------
     InputError
-        If the settings do not fit generated code.
+        If the settings do not fit generated code, or the car cannot do the trip.
     """
+    _check_road(trip)
     method = Method.of(controller, settings or ControllerSettings())
     values = method.values(trip.vehicle, method.horizon.block_count(trip.forecast.steps))
     files = project_files(values, "host", precision)
@@ -100,6 +103,28 @@ def plant_part(vehicle: Vehicle, trip: Trip | None = None) -> Part:
         template_text("NOTICE_plant.j2"),
         None if trip is None else trip.steps,
     )
+
+
+def _check_road(trip: Trip) -> None:
+    """Refuse a preview that the generated code would refuse as a whole.
+
+    Raises
+    ------
+    InputError
+        If a second of it is beyond what the car can do.
+    """
+    can = Capability.of(trip.vehicle, optimal_line(trip.vehicle.engine))
+    for what, values, low, high in (
+        ("demand in W", trip.forecast.demand_w, can.demand_min_w, can.demand_max_w),
+        ("speed in m/s", trip.forecast.speed_mps, 0.0, can.speed_max_mps),
+    ):
+        bad = np.flatnonzero(~((values >= low) & (values <= high)))
+        if bad.size:
+            raise InputError(
+                f"{shown(trip.cycle.name)}: {what} is {values[bad[0]]:.6g} at {bad[0]} s, beyond "
+                f"what {trip.vehicle.name} can do, {low:.6g} to {high:.6g}: no preview for a "
+                "controller"
+            )
 
 
 def _programs(names: tuple[str, ...]) -> dict[str, str]:

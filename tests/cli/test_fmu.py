@@ -81,6 +81,16 @@ def test_what_cannot_be_is_one_line(cli, tmp_path, monkeypatch, arguments, line)
     assert [path.name for path in tmp_path.iterdir()] == ["there.fmu"]
 
 
+def test_a_trip_that_the_car_cannot_do_is_no_preview(cli, tmp_path):
+    trip = tmp_path / "trip.csv"
+    trip.write_text("time_s,speed_mps\n" + "".join(f"{t},{6 * t}\n" for t in range(11)))
+    done = cli("fmu", tmp_path / "a.fmu", "--cycle", trip)
+    assert (done.code, done.out) == (2, "")
+    assert "demand in W is " in done.err
+    assert "beyond what prius-nimh can do" in done.err
+    assert done.err.count("\n") == 1
+
+
 def test_without_a_compiler_it_says_so(cli, tmp_path, monkeypatch):
     monkeypatch.setattr("qpmpc.codegen.fmu.export.compiler", lambda: None)
     done = cli("fmu", tmp_path / "a.fmu", "--part", "plant")

@@ -11,7 +11,8 @@ import pytest
 
 from qpmpc.codegen.c_compiler import compiler
 from qpmpc.codegen.fmu.export import export_fmu
-from qpmpc.codegen.fmu.parts import plant_part
+from qpmpc.codegen.fmu.parts import controller_part, plant_part
+from qpmpc.controllers.settings import ControllerSettings
 
 STANDARD = Path(fmpy.__file__).parent / "c-code"
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wdouble-promotion")
@@ -100,6 +101,15 @@ def test_no_variable_is_outside_an_instance(fmus, tmp_path, what):
     found = subprocess.run(["nm", *objects], capture_output=True, text=True, check=True).stdout
     assert re.search(r" [Rr] ", found)
     assert re.findall(r" [BbDdCcSs] \w+", found) == []
+
+
+def test_a_controller_that_learns_reads_fuel(trip):
+    """And no other has an input for it."""
+    settings = ControllerSettings().with_settings({"mh_qp.learning": True})
+    learns, does_not = controller_part(trip, "mh-qp", settings), controller_part(trip, "mh-qp")
+    inputs = [{v.name for v in p.variables if v.role == "input"} for p in (learns, does_not)]
+    assert inputs[0] - inputs[1] == {"fuel_g"}
+    assert "#define MPC_LEARNING 1" in learns.sources["mpc_config.h"]
 
 
 def test_the_same_input_is_the_same_file(tmp_path, trip):
