@@ -11,6 +11,7 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from qpmpc.codegen.c_compiler import CodegenError, compiler, library_of
 from qpmpc.codegen.fmu.description import About, Fmi, build_description, model_description
+from qpmpc.codegen.fmu.documentation import documentation
 from qpmpc.codegen.fmu.parts import Part
 from qpmpc.codegen.generate import template_text, texts_of
 from qpmpc.codegen.prefix import FORM, with_prefix
@@ -76,6 +77,7 @@ def export_fmu(part: Part, file: str | os.PathLike[str], fmi: Fmi = "2") -> str:
         "modelDescription.xml": model_description(fmi, about, part.variables, names),
         **{f"sources/{name}": text.encode() for name, text in sources.items()},
         f"binaries/{folder}/{identifier}{suffix}": _library(sources),
+        "documentation/index.html": documentation(about, part.variables).encode(),
         "documentation/licenses/license.txt": part.notice.encode(),
     }
     if fmi == "3":

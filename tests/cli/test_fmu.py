@@ -48,7 +48,10 @@ def test_the_name_of_a_users_cycle_stays_text(cli, trip, tmp_path):
     with ZipFile(tmp_path / "odd.fmu") as archive:
         described = archive.read("modelDescription.xml").decode()
         assert "a&lt;b&gt;&amp;&quot;c'" in described
-        texts = [archive.read(n).decode() for n in archive.namelist() if n.endswith((".c", ".h"))]
+        assert "a&lt;b&gt;&amp;" in archive.read("documentation/index.html").decode()
+        texts = [
+            archive.read(n).decode() for n in archive.namelist() if not n.startswith("binaries")
+        ]
     assert not any("a<b>" in text for text in texts)
 
 
