@@ -106,6 +106,15 @@ class Unit:
         method = getattr(self.fmu, f"{what}{GETTERS.get(variable.type, variable.type)}")
         return method([variable.valueReference], *values)
 
+    def outside(self) -> list[str]:
+        """Return the variables whose values are not in the ranges that the FMU declares."""
+        return [
+            name
+            for name, variable in self._variables.items()
+            if (variable.min is not None and self.get(name)[0] < float(variable.min))
+            or (variable.max is not None and self.get(name)[0] > float(variable.max))
+        ]
+
     def step(self, at_s: float, step_s: float = 1.0) -> Any:
         """Advance."""
         return self.fmu.doStep(currentCommunicationPoint=at_s, communicationStepSize=step_s)

@@ -71,7 +71,6 @@ def controller_variables(vehicle: Vehicle, learning: bool, certificate: bool) ->
             "Fuel by which the plan of this second may at most be improved, proven; 0 without a "
             "new plan",
             unit="g",
-            low=0.0,
             follows=True,
         )
         if certificate
@@ -104,10 +103,9 @@ def controller_variables(vehicle: Vehicle, learning: bool, certificate: bool) ->
         Variable(
             "on_share",
             "output",
-            "Share of the coming second for which the plan has the engine on; 0 without a new plan",
+            "Share of the second for which the plan has the engine on, to the tolerance of its "
+            "solver; 0 without a new plan",
             unit="1",
-            low=0.0,
-            high=1.0,
             follows=True,
         ),
         quality,

@@ -47,7 +47,11 @@ def test_two_fmus_are_simulate(fmus, trip, fmi, asks):
     run = simulate(trip, CONTROLLERS[fmi]).trajectory
     with Unit(fmus[f"controller{fmi}"]) as controller, Unit(fmus[f"plant{fmi}"]) as plant:
         loop = Loop(controller, plant, asks)
-        found = np.array([loop.second(t) for t in range(trip.steps)])
+        found, outside = np.empty((trip.steps, len(SHOWN) + 3)), set()
+        for t in range(trip.steps):
+            found[t] = loop.second(t)
+            outside |= {*controller.outside(), *plant.outside()}
+        assert outside == set()
         assert controller.get("time") == [trip.steps]
         assert plant.get("fuel_total_g")[0] == pytest.approx(run.fuel_g.sum(), rel=1e-9)
         assert plant.get("demand_w", "speed_mps") == [0.0, 0.0]
