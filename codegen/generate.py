@@ -19,6 +19,7 @@ from qpmpc.codegen.rows.solver_c import rows_files
 from qpmpc.codegen.values import Values
 from qpmpc.errors import InputError
 from qpmpc.files import check_folder, write_text
+from qpmpc.names import unknown
 
 Precision = Literal["f32", "f64"]
 Target = Literal["host", "cortex-m7"]
@@ -174,7 +175,7 @@ def one_of(name: str, names: tuple[Name, ...], what: str) -> Name:
     for known in names:
         if name == known:
             return known
-    raise InputError(f"unknown {what} {name!r}: use one of {', '.join(names)}")
+    raise InputError(unknown(what, name, names))
 
 
 @cache

@@ -1,5 +1,6 @@
 """Which implementation runs a controller on this machine: generated C, or Python."""
 
+import logging
 from collections.abc import Callable
 
 from qpmpc.codegen.c_compiler import CodegenError, compiler
@@ -14,6 +15,7 @@ from qpmpc.errors import InputError
 from qpmpc.remarks import say_once
 from qpmpc.trip import Trip
 
+_log = logging.getLogger(__name__)
 SLOWER = "steps take several times longer ({section}.implementation=python says that this is meant)"
 
 
@@ -70,12 +72,15 @@ def _made(
         try:
             if implementation == "auto" and compiler() is None:
                 raise CodegenError("no C compiler found (tried $CC, cc, gcc, clang)")
-            return in_c()
+            made = in_c()
+            _log.info("%s runs as compiled C", name)
+            return made
         except (InputError, CodegenError) as error:
             if implementation == "c":
                 raise
             reason = f"{name} runs in Python, not in C, {slower}: {error}"
     controller = in_python()
+    _log.info("%s runs in Python, solver %s", name, controller.solver_name)
     if reason:
         controller.remarks.append(reason)
         say_once(reason)

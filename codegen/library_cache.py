@@ -8,6 +8,7 @@ want the same file at once, one makes it and the others wait, for a limited time
 """
 
 import atexit
+import logging
 import os
 import shutil
 import tempfile
@@ -30,6 +31,7 @@ IN_USE_S = 60.0  # a file used in this time may be about to be loaded: it is not
 # for another process that makes the same; a library waits for its object too: twice this at most
 LONGEST_WAIT_S = 30.0
 POLL_S = 0.01
+_log = logging.getLogger(__name__)
 _OTHERS_WRITE = S_IWGRP | S_IWOTH
 
 
@@ -66,10 +68,12 @@ def kept_file(key: str, suffix: str, build: Callable[[], bytes]) -> Kept:
         fault = _fault(folder)
         if not fault:
             if found := _whole(folder, key, suffix):
+                _log.info("compiled controller kept in %s", found)
                 return Kept(found)
             with _alone(folder, key):
                 if found := _whole(folder, key, suffix):  # made while this process waited
                     return Kept(found)
+                _log.info("nothing in %s for %s%s: compiled now", folder, key, suffix)
                 content = build()
                 return Kept(_stored(folder, key, suffix, content))
     except OSError as error:
@@ -78,6 +82,15 @@ def kept_file(key: str, suffix: str, build: Callable[[], bytes]) -> Kept:
     found = _whole(private, key, suffix)
     file = found or _stored(private, key, suffix, content or build())
     return Kept(file, f"compiled controllers are not kept for the next run: {folder}: {fault}")
+
+
+def folder_and_fault() -> tuple[Path, str]:
+    """Return the folder of this cache, made if need be, and why it cannot be used, if so."""
+    folder = _folder()
+    try:
+        return folder, _fault(folder)
+    except OSError as error:
+        return folder, str(error.strerror)
 
 
 def _folder() -> Path:

@@ -1,5 +1,6 @@
 """Closed loop: a controller drives a trip on the plant, second by second."""
 
+import logging
 from collections.abc import Callable
 from dataclasses import replace
 from time import perf_counter
@@ -14,6 +15,7 @@ from qpmpc.results import Run
 from qpmpc.trajectory import Trajectory
 from qpmpc.trip import Observation, Trip
 
+_log = logging.getLogger(__name__)
 OnStep = Callable[[Observation, Decision], None]
 
 
@@ -65,6 +67,7 @@ def _drive(
     progress: Progress | None,
     foreign: ForeignPlant | None,
 ) -> Run:
+    _log.info("%s departs on %s, %d s", controller.name, trip.cycle.name, trip.steps)
     controller.begin(trip, progress)
     plant, steps = foreign or trip.plant, trip.steps
     record = Trajectory.empty(steps)
@@ -76,6 +79,8 @@ def _drive(
         start = perf_counter()
         decision = decide(seen)
         record.step_time_s[t] = perf_counter() - start
+        if decision.fallback:
+            _log.debug("second %d: %s drives", t, decision.fallback)
         if on_step is not None:
             on_step(seen, decision)
         state, flows = plant.step(state, decision.command, seen.demand_w, seen.speed_mps)
@@ -84,6 +89,12 @@ def _drive(
             report(t + 1, steps)
     if not controller.decides_online:
         record.step_time_s[:] = np.nan
+    _log.info(
+        "%s arrives: fallbacks drove in %d of %d s",
+        controller.name,
+        sum(map(bool, record.fallback)),
+        steps,
+    )
     record.demand_w[:], record.speed_mps[:] = trip.truth.demand_w, trip.truth.speed_mps
     return Run(
         cycle=trip.cycle.name,

@@ -1,6 +1,7 @@
 """Writing results: checked before the work; afterwards files are complete or absent."""
 
 import json
+import logging
 import os
 import re
 import secrets
@@ -16,6 +17,7 @@ from qpmpc.shown import is_plain
 
 MOST_LINKS = 40  # in a row, as in Linux
 PERMISSIONS = 0o777
+_log = logging.getLogger(__name__)
 
 
 def check_folder(folder: Path, option: str) -> None:
@@ -91,6 +93,7 @@ def write_bytes(file: Path, content: bytes) -> None:
         replace_file(_target(file), content, mode=found.st_mode & PERMISSIONS)
     else:
         _write_in_place(file, content)
+    _log.info("wrote %s, %d bytes", file, len(content))
 
 
 def write_text(file: Path, content: str) -> None:

@@ -1,5 +1,6 @@
 """Reading a user's text file: its name and size are checked before anything is made of it."""
 
+import logging
 import os
 from pathlib import Path
 
@@ -10,6 +11,7 @@ NAME_BYTES_MAX = 255
 
 PATH_BYTES_MAX = 4095
 SHOWN = 100  # characters of a path that are shown
+_log = logging.getLogger(__name__)
 
 
 def shown_path(path: str | os.PathLike[str]) -> str:
@@ -101,6 +103,7 @@ def read_bytes(path: str | os.PathLike[str], megabytes: int, prefix: str = "") -
         raise InputError(f"{prefix}{path}: {reason}") from None
     if len(content) > limit:
         raise InputError(f"{prefix}{path}: larger than {megabytes} MB, the most that is read")
+    _log.info("read %s, %d bytes", shown_path(path), len(content))
     return content
 
 

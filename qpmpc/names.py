@@ -1,7 +1,6 @@
 """Names that a user can type: shipped ones, and those that installed packages add to them."""
 
-import difflib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
@@ -10,6 +9,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from qpmpc.errors import InputError
+from qpmpc.nearest import nearest
 from qpmpc.problems import shown_value
 from qpmpc.remarks import say_once
 
@@ -139,8 +139,22 @@ def _load(target: str) -> Any:
     return getattr(import_module(module), attribute)
 
 
-def unknown(kind: str, name: str, allowed: tuple[str, ...], also: str = "") -> str:
-    """Return the message for an unknown name: the nearest known one and all others."""
-    near = difflib.get_close_matches(name, allowed, n=1)
-    hint = f", did you mean {near[0]!r}?" if near else ":"
-    return f"unknown {kind} {shown_value(name)}{hint} use one of {', '.join(allowed)}{also}"
+def unknown(kind: str, name: str, allowed: Iterable[str], also: str = "") -> str:
+    """Return the message for an unknown name: the nearest known one and all others.
+
+    Parameters
+    ----------
+    kind : of the name, in the singular
+    name : as the user gave it
+    allowed : all known names
+    also : other allowed inputs, at the end of the message
+    """
+    names = tuple(allowed)
+    use = f"use one of {', '.join(names)}{also}"
+    return f"unknown {kind} {shown_value(name)}{hint(name, names)} {use}"
+
+
+def hint(name: str, allowed: Iterable[str]) -> str:
+    """Return ``, did you mean 'nycc'?`` or, where no allowed name is near, a colon."""
+    near = nearest(name, allowed)
+    return f", did you mean {near!r}?" if near else ":"

@@ -35,6 +35,7 @@ NO_PROCESS = (
     "'if __name__ == \"__main__\":', since each process imports it"
 )
 THREADS_VARIABLE = "QPMPC_THREADS"
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,7 @@ class LocalWorkers:
 
     def __init__(self, count: int | None = None) -> None:
         self.slots = count or processes()
+        _log.info("%d worker processes", self.slots)
         self._others = set(multiprocessing.active_children())
         self._pool = self._new()
         self._first: Future[None] | None = None  # which needs nothing but a process
@@ -198,6 +200,7 @@ def completed(
             elif not workers.died(error):
                 raise error
             elif not alone:
+                _log.info("a process died: its %d jobs, and those beside it, alone", len(batch))
                 suspects.extend(batch)
             else:
                 deaths += 1

@@ -2,10 +2,11 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from difflib import get_close_matches
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
+
+from qpmpc.nearest import nearest
 
 SHOWN = 8  # problems of one sort; a file with more is probably the wrong one
 NAMES_SHOWN = 5  # of the columns of a file
@@ -81,7 +82,9 @@ def _wrong(each: ErrorDetails, key: str, owner: str, origins: Mapping[str, str])
         text = _WORDS[each["type"]].format(**each.get("ctx", {}))
     given = each["input"]
     if isinstance(given, str | float | int):
-        text += f" (given: {shown_value(given)})"
+        allowed = re.findall(r"'([^']*)'", each.get("ctx", {}).get("expected", ""))
+        near = nearest(given, allowed) if isinstance(given, str) else ""
+        text += f" (given: {shown_value(given)}{f', did you mean {near!r}?' if near else ''})"
     # A check of several keys together names them in its message: each may be in another file.
     prefix = f"{key}." if key else ""
     named = dict.fromkeys(prefix + word for word in re.findall(r"\w+(?:\.\w+)*", text))
@@ -115,10 +118,10 @@ def _suggestion(model: type[BaseModel], loc: tuple[int | str, ...]) -> str:
     """Suggest a key: in the same table if one is near, else in another."""
     *parents, last = (str(part) for part in loc)
     here = _model_at(model, tuple(parents)) if parents else model
-    for name in get_close_matches(last, here.model_fields if here else (), n=1):
+    if name := nearest(last, here.model_fields if here else ()):
         return f" (did you mean {'.'.join([*parents, name])}?)"
-    everywhere = {key.rpartition(".")[2]: key for key in _leaf_keys(model)}
-    for name in get_close_matches(last, everywhere, n=1, cutoff=0.8):
+    everywhere = {key.rpartition(".")[2]: key for key in leaf_keys(model)}
+    if name := nearest(last, everywhere, cutoff=0.8):
         return f" (did you mean {everywhere[name]}?)"
     return ""
 
@@ -133,11 +136,12 @@ def _model_at(model: type[BaseModel], loc: tuple[int | str, ...]) -> type[BaseMo
     return here
 
 
-def _leaf_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
+def leaf_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
+    """Yield the dotted names of all values of a model."""
     for name in model.model_fields:
         inner = _model_at(model, (name,))
         if inner:
-            yield from _leaf_keys(inner, f"{prefix}{name}.")
+            yield from leaf_keys(inner, f"{prefix}{name}.")
         else:
             yield prefix + name
 

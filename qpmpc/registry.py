@@ -6,14 +6,13 @@ points, see `Names`; ``docs/extending.md`` shows how.
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from difflib import get_close_matches
 
 from qpmpc.controllers.base import Controller
 from qpmpc.controllers.receding_horizon import Planner, RecedingHorizon
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles.load import CYCLES
 from qpmpc.errors import InputError
-from qpmpc.names import Names, Shipped, unknown
+from qpmpc.names import Names, Shipped, hint, unknown
 from qpmpc.problems import shown_value
 from qpmpc.solvers.names import SOLVERS
 from qpmpc.trip import Trip
@@ -246,11 +245,9 @@ def check_sections(
                 - _SCALARS
             )
             key = ".".join([section, *list(values)[:1]])
-            near = get_close_matches(_section(section), known, n=1)
-            hint = f", did you mean {near[0]!r}?" if near else ":"
             raise InputError(
-                f"no parameter {shown_value(key)}{hint} names start with one of "
-                f"{', '.join(known)} and a dot"
+                f"no parameter {shown_value(key)}{hint(section, known)} names start with "
+                f"one of {', '.join(known)} and a dot"
             )
         if model is None:
             raise InputError(f"controller {section.replace('_', '-')!r} has no settings of its own")

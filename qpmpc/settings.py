@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from qpmpc.errors import InputError
+from qpmpc.names import hint
 from qpmpc.problems import problems_line, shown_value
 
 DEPTH_MAX = 32
@@ -144,5 +145,6 @@ def _copy(data: dict[str, Any]) -> dict[str, Any]:
 def _unknown(dotted: str, part: str, place: dict[str, Any], owner: str) -> InputError:
     key, unknown = shown_value(dotted), shown_value(part)
     return InputError(
-        f"{owner}: no parameter {key}: {unknown} is not one of {', '.join(sorted(place))}"
+        f"{owner}: no parameter {key}{hint(part, place)} {unknown} is not one of "
+        f"{', '.join(sorted(place))}"
     )

@@ -4,6 +4,7 @@ import re
 from typing import NamedTuple
 
 from qpmpc.errors import InputError
+from qpmpc.names import unknown
 from qpmpc.problems import shown_value
 
 SETS: dict[str, int] = {"train": 200, "judge": 200}
@@ -46,7 +47,7 @@ def set_names(name: str) -> tuple[str, ...]:
         If there is no such set.
     """
     if name not in SETS:
-        raise InputError(f"unknown set of trips {shown_value(name)}: use one of {', '.join(SETS)}")
+        raise InputError(unknown("set of trips", name, SETS))
     return tuple(f"{name}-{i:03d}" for i in range(SETS[name]))
 
 

@@ -11,9 +11,13 @@ from qpmpc._version import __version__
 from qpmpc.cli.benchmark import benchmark
 from qpmpc.cli.codegen import codegen
 from qpmpc.cli.compare import compare
+from qpmpc.cli.completion import complete_log_level
 from qpmpc.cli.convert import convert
 from qpmpc.cli.cycles import cycles
+from qpmpc.cli.doctor import doctor
+from qpmpc.cli.first_run import FIRST_RUN
 from qpmpc.cli.fmu import fmu
+from qpmpc.cli.logs import QUIET, set_log_level
 from qpmpc.cli.pil import pil
 from qpmpc.cli.reproduce import reproduce
 from qpmpc.cli.simulate import simulate
@@ -30,8 +34,8 @@ DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 DEBUG_VARIABLE = "QPMPC_DEBUG"
 
 app = typer.Typer(
-    add_completion=False,
     pretty_exceptions_enable=False,
+    invoke_without_command=True,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Multi-horizon MPC, posed as a QP, for the power and heat of hybrid cars.",
@@ -54,6 +58,7 @@ app.command()(cycles)
 app.command()(trips)
 app.command()(vehicles)
 app.command()(vehicle_from_map)
+app.command()(doctor)
 
 
 def _version(wanted: bool) -> None:
@@ -64,12 +69,26 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def _common(
+    context: typer.Context,
     version: Annotated[
         bool,
         typer.Option("--version", help="Show the version.", callback=_version, is_eager=True),
     ] = False,
+    log_level: Annotated[
+        str,
+        typer.Option(
+            "--log-level",
+            metavar="LEVEL",
+            help="Say on stderr what happens: info names files, caches and solvers, debug more; "
+            "error leaves out remarks too. Stands before the command.",
+            autocompletion=complete_log_level,
+        ),
+    ] = QUIET,
 ) -> None:
     """Options of `qpmpc` itself."""
+    set_log_level(log_level)
+    if context.invoked_subcommand is None:
+        typer.echo(FIRST_RUN, nl=False)
 
 
 def main(args: Sequence[str] | None = None) -> NoReturn:

@@ -4,6 +4,7 @@ from typing import Annotated
 
 import typer
 
+from qpmpc.cli.completion import complete_controllers, complete_cycle
 from qpmpc.cli.options import JsonOption, OutOption, SetOption, VehicleOption
 
 CYCLES = ["nycc", "nedc-truncated"]
@@ -16,6 +17,7 @@ def benchmark(
         list[str] | None,
         typer.Argument(
             metavar="[CYCLE...]",
+            autocompletion=complete_cycle,
             help="Shipped cycles, trips or files; nycc and nedc-truncated if none is named.",
             show_default=False,
         ),
@@ -25,6 +27,7 @@ def benchmark(
         str | None,
         typer.Option(
             metavar="NAME,NAME,...",
+            autocompletion=complete_controllers,
             help="Candidates by their labels, such as hpipm or 'osqp K=50', and controllers; "
             "a wrong name lists all.",
             show_default="all candidates",

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from qpmpc.cli.completion import complete_generated
 from qpmpc.cli.options import SetOption, VehicleOption
 
 
@@ -12,7 +13,12 @@ def codegen(
     folder: Annotated[
         Path, typer.Argument(metavar="DIR", help="Folder of the project.", show_default=False)
     ],
-    controller: Annotated[str, typer.Option(metavar="NAME", help="mh-qp or mh-costate.")] = "mh-qp",
+    controller: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME", help="mh-qp or mh-costate.", autocompletion=complete_generated
+        ),
+    ] = "mh-qp",
     target: Annotated[
         str,
         typer.Option(metavar="TARGET", help="host (shared library) or cortex-m7 (firmware)."),

@@ -4,6 +4,7 @@ from typing import Annotated
 
 import typer
 
+from qpmpc.cli.completion import complete_controllers, complete_cycle
 from qpmpc.cli.options import JsonOption, OptionalVehicleOption, OutOption, PlantOption, SetOption
 
 DEFAULT_CONTROLLERS = "rule-based,mh-qp-paper,mh-qp"
@@ -14,13 +15,18 @@ def compare(
         list[str],
         typer.Argument(
             metavar="CYCLE...",
+            autocompletion=complete_cycle,
             help="Shipped cycles (see [b]qpmpc cycles[/b]), trips or files (CSV, GPX, MDF).",
             show_default=False,
         ),
     ],
     controllers: Annotated[
         str,
-        typer.Option(metavar="NAME,NAME,...", help="Such as mh-nlp, dp; a wrong name lists all."),
+        typer.Option(
+            metavar="NAME,NAME,...",
+            autocompletion=complete_controllers,
+            help="Such as mh-nlp, dp; a wrong name lists all.",
+        ),
     ] = DEFAULT_CONTROLLERS,
     vehicle: OptionalVehicleOption = None,
     plant: PlantOption = None,

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from qpmpc.cli.completion import complete_cycle
 from qpmpc.cli.options import OutOption
 
 if TYPE_CHECKING:
@@ -16,7 +17,10 @@ def cycles(
     name: Annotated[
         str | None,
         typer.Argument(
-            metavar="NAME|FILE.csv", help="Show details of this one.", show_default=False
+            metavar="NAME|FILE.csv",
+            autocompletion=complete_cycle,
+            help="Show details of this one.",
+            show_default=False,
         ),
     ] = None,
     out: OutOption = None,

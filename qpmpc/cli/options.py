@@ -5,8 +5,16 @@ from typing import Annotated
 
 import typer
 
+from qpmpc.cli.completion import (
+    complete_cycle,
+    complete_plant,
+    complete_setting,
+    complete_vehicle,
+)
+
 CYCLE_ARGUMENT = typer.Argument(
     metavar="CYCLE",
+    autocompletion=complete_cycle,
     help="A shipped cycle (see [b]qpmpc cycles[/b]), a trip (see [b]qpmpc trips[/b]) or a "
     "file: CSV with time_s,speed_mps[dim],grade[/dim], or a log with units of its own, GPX, "
     "MDF.",
@@ -18,6 +26,7 @@ VehicleOption = Annotated[
     typer.Option(
         "--vehicle",
         metavar="NAME|FILE.toml",
+        autocompletion=complete_vehicle,
         help="A shipped vehicle (see [b]qpmpc vehicles[/b]) or a TOML file, "
         "complete or with a base.",
     ),
@@ -27,6 +36,7 @@ OptionalVehicleOption = Annotated[
     typer.Option(
         "--vehicle",
         metavar="NAME|FILE.toml",
+        autocompletion=complete_vehicle,
         help="A shipped vehicle (see [b]qpmpc vehicles[/b]) or a TOML file, "
         "complete or with a base.",
         show_default="prius-nimh",
@@ -37,6 +47,7 @@ PlantOption = Annotated[
     typer.Option(
         "--plant",
         metavar="NAME",
+        autocompletion=complete_plant,
         help="Drive somebody else's plant in place of ours: fastsim, whose own control is then the "
         "controller fastsim. Controllers believe in a car derived from it; --vehicle gives them "
         "another engine's fuel.",
@@ -48,6 +59,7 @@ SetOption = Annotated[
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
+        autocompletion=complete_setting,
         help="Change a parameter of the vehicle or of a controller by its dotted name; repeatable. "
         "A wrong name lists the right ones.",
         show_default=False,

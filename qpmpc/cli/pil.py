@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from qpmpc.cli.completion import complete_generated
 from qpmpc.cli.options import CYCLE_ARGUMENT, JsonOption, OutOption, SetOption, VehicleOption
 
 if TYPE_CHECKING:
@@ -17,7 +18,12 @@ if TYPE_CHECKING:
 def pil(
     context: typer.Context,
     cycle: Annotated[str | None, CYCLE_ARGUMENT] = None,
-    controller: Annotated[str, typer.Option(metavar="NAME", help="mh-qp or mh-costate.")] = "mh-qp",
+    controller: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME", help="mh-qp or mh-costate.", autocompletion=complete_generated
+        ),
+    ] = "mh-qp",
     target: Annotated[
         str,
         typer.Option(metavar="TARGET", help="cortex-m7; with --project linux too."),

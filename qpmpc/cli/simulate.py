@@ -4,6 +4,7 @@ from typing import Annotated
 
 import typer
 
+from qpmpc.cli.completion import complete_controller
 from qpmpc.cli.options import (
     CycleArgument,
     ForecastOption,
@@ -19,7 +20,11 @@ def simulate(
     cycle: CycleArgument,
     controller: Annotated[
         str,
-        typer.Option(metavar="NAME", help="Such as mh-qp, mh-nlp, dp; a wrong name lists all."),
+        typer.Option(
+            metavar="NAME",
+            autocompletion=complete_controller,
+            help="Such as mh-qp, mh-nlp, dp; a wrong name lists all.",
+        ),
     ] = "mh-qp",
     vehicle: VehicleOption = "prius-nimh",
     set_: SetOption = None,

@@ -5,13 +5,19 @@ from typing import Annotated
 
 import typer
 
+from qpmpc.cli.completion import complete_study
 from qpmpc.cli.options import JsonOption, OutOption
 
 
 def studies(
     name: Annotated[
         str | None,
-        typer.Argument(metavar="NAME", help="Print the file of this one.", show_default=False),
+        typer.Argument(
+            metavar="NAME",
+            autocompletion=complete_study,
+            help="Print the file of this one.",
+            show_default=False,
+        ),
     ] = None,
 ) -> None:
     """List the shipped studies, or print the file of one: to read, or to start your own from.

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from qpmpc.cli.completion import complete_study
 from qpmpc.cli.options import JsonOption
 
 OUT_HELP = "Keep the results in this folder. [dim]Default: results/NAME[/dim]"
@@ -15,6 +16,7 @@ def sweep(
         str,
         typer.Argument(
             metavar="STUDY",
+            autocompletion=complete_study,
             help="A shipped study (see [b]qpmpc studies[/b]) or a TOML file.",
             show_default=False,
         ),

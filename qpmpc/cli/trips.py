@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from qpmpc.cli.completion import complete_set
 from qpmpc.cli.options import JsonOption, OutOption
 
 if TYPE_CHECKING:
@@ -14,7 +15,10 @@ def trips(
     name: Annotated[
         str | None,
         typer.Argument(
-            metavar="SET|TRIP", help="One set, or one trip of any set.", show_default=False
+            metavar="SET|TRIP",
+            autocompletion=complete_set,
+            help="One set, or one trip of any set.",
+            show_default=False,
         ),
     ] = None,
     out: OutOption = None,
@@ -42,7 +46,7 @@ def trips(
     from qpmpc.cycles import cycle_names, load_cycle
     from qpmpc.cycles.trips import ALLOWED, SETS, is_trip, make_trip, set_names
     from qpmpc.errors import InputError
-    from qpmpc.problems import shown_value
+    from qpmpc.names import unknown
     from qpmpc.report.table import print_rows
     from qpmpc.report.trip_set import SET_COLUMNS, TRIP_COLUMNS, cycle_row, quantile_rows
     from qpmpc.report.write import write_trip_set, write_trips
@@ -50,9 +54,7 @@ def trips(
     if name is None and out is not None:
         raise InputError("--out writes one set or trip: name it, e.g. qpmpc trips train --out DIR")
     if name is not None and name not in SETS and not is_trip(name):
-        raise InputError(
-            f"unknown trip or set {shown_value(name)}: use {', '.join(SETS)}, or one of {ALLOWED}"
-        )
+        raise InputError(unknown("trip or set", name, SETS, f", {ALLOWED}"))
     check_outputs(json_file, out)
     console = result_console(json_file)
     if name is not None and name not in SETS:

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from qpmpc.cli.completion import complete_vehicle
 from qpmpc.cli.options import JsonOption
 
 DOUBTFUL = 0.15  # best efficiency below which a unit is probably wrong
@@ -29,7 +30,10 @@ def vehicle_from_map(
     base: Annotated[
         str,
         typer.Option(
-            "--base", metavar="NAME|FILE.toml", help="The vehicle that gives all but the engine."
+            "--base",
+            metavar="NAME|FILE.toml",
+            autocompletion=complete_vehicle,
+            help="The vehicle that gives all but the engine.",
         ),
     ] = "prius-nimh",
     name: Annotated[

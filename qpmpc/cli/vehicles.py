@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from qpmpc.cli.completion import complete_vehicle
 from qpmpc.cli.options import OutOption
 
 if TYPE_CHECKING:
@@ -18,7 +19,10 @@ def vehicles(
     name: Annotated[
         str | None,
         typer.Argument(
-            metavar="NAME|FILE.toml", help="Show the parameters of this one.", show_default=False
+            metavar="NAME|FILE.toml",
+            autocompletion=complete_vehicle,
+            help="Show the parameters of this one.",
+            show_default=False,
         ),
     ] = None,
     toml: Annotated[

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from qpmpc.cli.completion import complete_check
 from qpmpc.cli.options import JsonOption, OutOption
 
 NEEDED = ("casadi", "clarabel", "daqp", "numba", "piqp", "qoco")
@@ -19,6 +20,7 @@ def verify(
         typer.Option(
             "--only",
             metavar="GROUP",
+            autocompletion=complete_check,
             help="This group of checks alone; repeatable. A wrong name lists all.",
             show_default=False,
         ),

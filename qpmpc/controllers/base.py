@@ -14,6 +14,7 @@ from qpmpc.controllers.monitor import NOTHING_WRONG, Flag, InputMonitor
 from qpmpc.controllers.safety import SafetyLayer
 from qpmpc.controllers.settings import SettingsLike, as_settings
 from qpmpc.errors import InputError, QpmpcError
+from qpmpc.names import hint
 from qpmpc.preview.stages import Preview
 from qpmpc.qp.expectation import Expectation
 from qpmpc.trip import Observation, Trip
@@ -91,10 +92,11 @@ class Driver:
         own = self.name.replace("-", "_")
         strange = [section for section in self.settings.others if section != own]
         if strange and isinstance(settings, Mapping):
+            known = tuple(dict.fromkeys([*self.settings.sections(), own]))
             raise InputError(
-                f"{self.name}: no settings {', '.join(strange)}; here names start with one of "
-                f"{', '.join(dict.fromkeys([*self.settings.sections(), own]))}, those of the "
-                "vehicle are given to its trip"
+                f"{self.name}: no settings {', '.join(strange)}{hint(strange[0], known)} here "
+                f"names start with one of {', '.join(known)}, those of the vehicle are given to "
+                "its trip"
             )
 
     def own_settings(self) -> BaseModel:

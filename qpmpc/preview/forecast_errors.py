@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from qpmpc.cycles import Cycle
 from qpmpc.cycles.standstill import phases
 from qpmpc.errors import InputError
+from qpmpc.names import unknown
 from qpmpc.preview.forecast import Trace
 from qpmpc.vehicle.parameters import Vehicle
 
@@ -125,7 +126,7 @@ def parse_forecast(text: str) -> tuple[str, int]:
     """
     model, colon, seed = text.partition(":")
     if model not in MODELS:
-        raise InputError(f"unknown forecast error {model!r}: use one of {', '.join(MODELS)}")
+        raise InputError(unknown("forecast error", model, MODELS))
     if colon and not (seed.isascii() and seed.isdecimal() and len(seed) <= SEED_DIGITS):
         raise InputError(f"forecast {text!r}: the seed must be an integer, 0 or more")
     return model, int(seed or 0)
@@ -147,7 +148,7 @@ def forecast(cycle: Cycle, vehicle: Vehicle, model: str, seed: int) -> Trace:
         If there is no such model.
     """
     if model not in MODELS:
-        raise InputError(f"unknown forecast error {model!r}: use one of {', '.join(MODELS)}")
+        raise InputError(unknown("forecast error", model, MODELS))
     rng = np.random.default_rng([list(MODELS).index(model), seed])
     return Trace.of(MODELS[model](cycle, rng), vehicle)
 

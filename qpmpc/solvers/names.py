@@ -1,7 +1,8 @@
 """QP backends by name; other packages add theirs by entry points of ``qpmpc.solvers``."""
 
 from qpmpc.errors import InputError
-from qpmpc.names import Names, Shipped
+from qpmpc.names import Names, Shipped, hint
+from qpmpc.problems import shown_value
 from qpmpc.solvers.base import QpSolver
 from qpmpc.solvers.timed import DEFAULT_TOLERANCE, require
 
@@ -65,6 +66,7 @@ def _through_qpsolvers(solver: str, tolerance: float) -> QpSolver:
     found = require("qpsolvers", solver).available_solvers
     if solver not in found:
         raise InputError(
-            f"qpsolvers finds no solver {solver!r} here, only {', '.join(sorted(found))}"
+            f"qpsolvers finds no solver {shown_value(solver)} here{hint(solver, found)} "
+            f"use one of {', '.join(sorted(found))}"
         )
     return ThroughQpsolvers(solver, tolerance)

@@ -19,6 +19,7 @@ REACH_S = 10.0  # in which a scheduler answers
 COUNT_S = 2.0  # between two counts of the workers
 WORKERS_S = 30.0  # in which its first worker is there
 PORT_MAX = 65_535
+_log = logging.getLogger(__name__)
 _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://\S+:([0-9]{1,5})/?", re.ASCII)
 
 
@@ -59,6 +60,7 @@ class ClusterWorkers:
         self._killed = distributed.scheduler.KilledWorker
         self._closed = distributed.comm.core.CommClosedError
         self._slots, self._counted_until = 1, 0.0
+        _log.info("workers of the scheduler %s", address)
 
     @property
     def slots(self) -> int:

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from qpmpc.cycles.trips import SETS
 from qpmpc.cycles.trips.names import SEEDS
+from qpmpc.names import unknown
 from qpmpc.registry import reads
 from qpmpc.study.sampling import KINDS, Sample, Value, points_of
 from qpmpc.vehicle.names import DEFAULT_VEHICLE
@@ -105,9 +106,7 @@ class Study(BaseModel):
             if len(inside) > 1:
                 raise ValueError(f"{key} is in {' and in '.join(inside)}: give it in one of them")
             if key not in OF_RUN and "." not in key:
-                raise ValueError(
-                    f"unknown key {key!r}: use {', '.join(OF_RUN)} or a setting's dotted name"
-                )
+                raise ValueError(unknown("key", key, OF_RUN, ", or a setting's dotted name"))
             values = self._given(key)
             kinds = {type(value) for value in values}
             if len(kinds) > 1 and kinds != {int, float}:

@@ -10,6 +10,7 @@ from qpmpc.cycles.load import CYCLES
 from qpmpc.cycles.trips import SETS, is_trip, make_trip
 from qpmpc.errors import InputError
 from qpmpc.faults.models import Faults, load_faults
+from qpmpc.names import unknown
 from qpmpc.preview.forecast_errors import MODELS
 from qpmpc.registry import check_controllers, split_settings
 from qpmpc.remarks import say_once
@@ -86,9 +87,7 @@ def read_inputs(study: Study) -> Inputs:
         say_once(remark)
     for forecast in study.values_of("forecast"):
         if forecast not in (TRUE_FORECAST, *MODELS):
-            raise InputError(
-                f"unknown forecast {forecast!r}: use {', '.join((TRUE_FORECAST, *MODELS))}"
-            )
+            raise InputError(unknown("forecast", str(forecast), (TRUE_FORECAST, *MODELS)))
     _check_settings(study, controllers, list(loaded.values()))
     return Inputs(
         {name: cycle for name, cycle in cycles.items() if name not in CYCLES},

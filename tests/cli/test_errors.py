@@ -25,10 +25,10 @@ def files(folder: Path) -> dict[str, bytes]:
 @pytest.mark.parametrize(
     ("args", "words"),
     [
-        ([], ["command"]),
         (["nonsense"], ["nonsense", "--help"]),
         (["simulate"], ["CYCLE", "qpmpc simulate --help"]),
         (["simulate", "nycc", "--nonsense"], ["--nonsense"]),
+        (["--log-level", "inof", "simulate", "nycc"], ["did you mean 'info'"]),
         (["simulate", "nycc", "extra"], ["extra"]),
         (["simulate", "nonsense"], ["nonsense", "nycc", "CSV"]),
         (["simulate", "missing.csv"], ["missing.csv"]),
