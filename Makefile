@@ -1,9 +1,12 @@
 # make run    the main job: real cycles, rule-based against MPC, tables and pictures in results/
 # make test   style, types and tests
 # make fuzz   100,000 hostile inputs to the loaders of users' files
+# make release-check  wheel and sdist, built and tried in clean environments of every Python here
+# make sbom   licences of what is shipped and needed, in build/sbom.cdx.json
+# make history        the benchmark history, extended by this commit
 # make docs   API reference from the docstrings, in build/api
 # make clean  remove everything these made
-# Both first make the virtual environment .venv; a second time that is skipped.
+# All but release-check first make the virtual environment .venv; a second time that is skipped.
 
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
@@ -16,7 +19,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 # in which the mapped folders are where they are imported from.
 TYPED := build/typed
 
-.PHONY: run test fuzz lint types docs venv clean
+.PHONY: run test fuzz lint types docs release-check sbom history venv clean
 
 run: $(STAMP)
 	$(BIN)/qpmpc compare nycc nedc-truncated --controllers rule-based,mh-qp-paper,mh-qp --out results
@@ -37,6 +40,15 @@ types: $(STAMP)
 
 docs: $(STAMP)
 	$(BIN)/python docs/make_api.py build/api
+
+release-check:
+	$(PYTHON) release/check.py
+
+sbom: $(STAMP)
+	$(BIN)/python release/sbom.py build/sbom.cdx.json
+
+history: $(STAMP)
+	$(BIN)/python release/history.py
 
 venv: $(STAMP)
 

@@ -7,6 +7,7 @@ they are compiled into one relocatable object, with which that file is linked.
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 from collections.abc import Mapping
 from functools import cache
@@ -16,7 +17,9 @@ from qpmpc.errors import QpmpcError
 
 # -w: a new compiler's warnings must not stop a user; the tests check warnings
 COMPILE = "-O3 -std=c99 -w -ffp-contract=off -fPIC -Iosqp -Iosqp/inc/public -Iosqp/inc/private"
-FLAGS = f"{COMPILE} -shared -Wl,-Bsymbolic"
+# of several loaded libraries each must call its own functions; macOS has it so by itself
+OWN_FUNCTIONS = "" if sys.platform == "darwin" else " -Wl,-Bsymbolic"
+FLAGS = f"{COMPILE} -shared{OWN_FUNCTIONS}"
 RELOCATABLE = f"{COMPILE} -r -nostdlib"
 DATA = "mpc_data.c"
 NEEDS_NONE = "mh_qp.implementation=python needs none"
