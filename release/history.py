@@ -67,8 +67,9 @@ def history_text(rows: list[Row]) -> str:
 def measured(wall: bool) -> Iterator[tuple[str, str, str, str]]:
     """Yield measure, unit, value and what it was made with."""
     require_tools()
-    said = subprocess.run([COMPILER, "--version"], capture_output=True, text=True, check=True)
-    compiler = f"{COMPILER} {said.stdout.splitlines()[0].rpartition(' ')[2]}"
+    asked = [COMPILER, "-dumpfullversion"]
+    said = subprocess.run(asked, capture_output=True, text=True, check=True)
+    compiler = f"{COMPILER} {said.stdout.strip()}"
     for controller in CONTROLLERS:
         count = str(instructions(controller))
         yield f"{controller} f32 step", "instructions", count, compiler
@@ -107,22 +108,35 @@ def picture(rows: list[Row]) -> bytes:
     figure = Figure(figsize=(10, 4), layout="constrained")
     for axes, (unit, title) in zip(figure.subplots(1, 2), units.items(), strict=True):
         scale = 1e6 if unit == "instructions" else 1.0
-        for measure in dict.fromkeys(row.measure for row in rows if row.unit == unit):
+        of_unit = [row for row in rows if row.unit == unit]
+        # one colour for what is measured, one line for each controller
+        subjects = list(dict.fromkeys(_split(row.measure)[1] for row in of_unit))
+        for measure in dict.fromkeys(row.measure for row in of_unit):
+            controller, subject = _split(measure)
             points = {
-                row.commit: float(row.value) / scale for row in rows if row.measure == measure
+                row.commit: float(row.value) / scale for row in of_unit if row.measure == measure
             }
-            places = [commits.index(commit) for commit in points]
-            style = "o-" if measure.startswith(CONTROLLERS[0]) else "s--"
-            name = measure.replace(" above DP ", ", ").replace(" f32 step", "")
-            axes.plot(places, list(points.values()), style, label=name, markersize=4)
+            axes.plot(
+                [commits.index(commit) for commit in points],
+                list(points.values()),
+                "o-" if controller == CONTROLLERS[0] else "s--",
+                color=f"C{subjects.index(subject)}",
+                label=f"{controller} {subject}",
+                markersize=4,
+            )
         axes.set_xticks(range(len(commits)), commits, rotation=30, ha="right", fontsize=7)
         axes.set_title(title, fontsize=10)
         axes.set_ylim(bottom=0)
         axes.grid(alpha=0.3)
-        axes.legend(fontsize=6, ncols=2 if unit == "%" else 1)
+        axes.legend(fontsize=6, loc="center left", bbox_to_anchor=(1.0, 0.5))
     stream = BytesIO()
     figure.savefig(stream, format="png", dpi=110, metadata={"Software": None})
     return stream.getvalue()
+
+
+def _split(measure: str) -> tuple[str, str]:
+    controller, _, subject = measure.partition(" ")
+    return controller, subject.removeprefix("above DP ").removeprefix("f32 ")
 
 
 def commit_and_date() -> tuple[str, str]:
