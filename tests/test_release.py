@@ -129,7 +129,7 @@ def test_the_interface_has_one_number():
 
 def test_the_pages_that_the_policy_refers_to_are_there():
     policy = (ROOT / "docs" / "release.md").read_text("utf-8")
-    pages = {page for page in re.findall(r"\]\(([\w./]+)[)#]", policy)}
+    pages = set(re.findall(r"\]\(([\w./]+)[)#]", policy))
     assert len(pages) > 5
     for page in pages:
         assert (ROOT / "docs" / page).exists(), page
