@@ -9,6 +9,7 @@ from types import MappingProxyType
 
 from qpmpc.delimited import plain_unit
 from qpmpc.errors import InputError
+from qpmpc.names import hint
 from qpmpc.problems import shown_value
 
 
@@ -110,9 +111,10 @@ class LogOptions:
         for quantity in QUANTITIES:
             unit = plain.get(quantity.name)
             if unit is not None and unit not in quantity.units:
+                given = self.units[quantity.name]
                 raise InputError(
-                    f"{quantity.option} {shown_value(self.units[quantity.name])}: must be one of "
-                    f"{', '.join(quantity.units)}"
+                    f"{quantity.option} {shown_value(given)}{hint(given, quantity.units)} must be "
+                    f"one of {', '.join(quantity.units)}"
                 )
         object.__setattr__(self, "units", plain)
 

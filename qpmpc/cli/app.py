@@ -32,6 +32,8 @@ from qpmpc.shown import shown
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 DEBUG_VARIABLE = "QPMPC_DEBUG"
+_OF_QPMPC = ("--log-level", "--version")
+_LONGEST_WORD = 80  # of another package's message, which repeats what was typed
 
 app = typer.Typer(
     pretty_exceptions_enable=False,
@@ -132,15 +134,19 @@ def _one_line(error: Exception) -> str:
         return str(error)
     if hasattr(error, "format_message"):
         command = getattr(getattr(error, "ctx", None), "command_path", "qpmpc")
-        return f"{_folded(error.format_message()).rstrip('.')} (see {command} --help)"
+        text = _folded(error.format_message().strip().rstrip("."))
+        if getattr(error, "option_name", "") in _OF_QPMPC:
+            text += ": it stands before the command"
+        return f"{text} (see {command} --help)"
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
     return f"{type(error).__name__}: {_folded(str(error))} ({DEBUG_VARIABLE}=1 shows where)"
 
 
 def _folded(text: str) -> str:
-    """Return the message of another package on one line."""
-    return " ".join(text.split())
+    """Return the message of another package on one line, long words cut."""
+    words = text.split()
+    return " ".join(w if len(w) <= _LONGEST_WORD else f"{w[: _LONGEST_WORD - 3]}..." for w in words)
 
 
 def _say(text: str) -> None:

@@ -28,6 +28,7 @@ def files(folder: Path) -> dict[str, bytes]:
         (["nonsense"], ["nonsense", "--help"]),
         (["simulate"], ["CYCLE", "qpmpc simulate --help"]),
         (["simulate", "nycc", "--nonsense"], ["--nonsense"]),
+        (["simulate", "nycc", "--log-level", "info"], ["--log-level", "before the command"]),
         (["--log-level", "inof", "simulate", "nycc"], ["did you mean 'info'"]),
         (["simulate", "nycc", "extra"], ["extra"]),
         (["simulate", "nonsense"], ["nonsense", "nycc", "CSV"]),

@@ -52,6 +52,11 @@ def test_the_nearest_name_is_in_the_error(cli, args, meant):
     cli(*args).assert_refused(meant)
 
 
+def test_the_nearest_unit_is_in_the_error(cli, trip, tmp_path):
+    done = cli("convert", trip, "--out", tmp_path / "y.csv", "--speed-unit", "knot")
+    done.assert_refused("did you mean 'knots'")
+
+
 def completed(words: str) -> list[str]:
     """Names that bash is given for the last word, as its completion script asks for them."""
     number = len(words.split()) - (not words.endswith(" "))

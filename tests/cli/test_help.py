@@ -5,7 +5,7 @@ import pytest
 
 from qpmpc import __version__
 
-COMMANDS = ["simulate", "compare", "codegen", "pil", "benchmark", "cycles", "vehicles"]
+COMMANDS = ["simulate", "compare", "codegen", "pil", "benchmark", "cycles", "vehicles", "doctor"]
 
 
 def test_version(cli):

@@ -43,6 +43,10 @@ ARGUMENTS = {
     "out: long": (["simulate", "nycc", "--out", "a/" * 3000], ["--out a/a/", "too long"]),
     "json: latin": (["simulate", "nycc", "--json", LATIN], ["--json caf\\udce9", "not UTF-8"]),
     "json: long": (["compare", "nycc", "--json", "a" * 256], ["--json aaa", "too long"]),
+    "command: long": ([LONG], ["aaa..."]),
+    "option: long": (["simulate", "nycc", f"--{LONG}"], ["--aaa", "..."]),
+    "option: escape": (["simulate", "nycc", "--a\x1b[31m"], ["--a\\x1b[31m"]),
+    "log level: long": (["--log-level", LONG, "cycles"], ["aaa...", "debug"]),
     "folder: latin": (["codegen", LATIN], ["caf\\udce9", "not UTF-8"]),
 }
 FILES = {

@@ -42,7 +42,11 @@ _EXTRA = re.compile(r"""extra\s*==\s*["']([\w-]+)["']""")
 def requirements() -> dict[str, list[str]]:
     """Return the names of the packages of the core and of each extra."""
     found: dict[str, list[str]] = defaultdict(list)
-    for line in metadata.requires(DISTRIBUTION) or ():
+    try:
+        lines = metadata.requires(DISTRIBUTION) or ()
+    except metadata.PackageNotFoundError:  # it runs from a folder that nothing was installed from
+        return {"core": [DISTRIBUTION]}
+    for line in lines:
         name, extra = _REQUIREMENT.match(line), _EXTRA.search(line)
         group = extra[1] if extra else "core"
         if name and group not in SUMS:
