@@ -1,22 +1,21 @@
-from time import perf_counter
-
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from qpmpc.cycles.load import CYCLES
-from qpmpc.nearest import nearest
+from qpmpc.nearest import LONGEST, nearest
 from qpmpc.registry import controller_names
 from qpmpc.vehicle.names import VEHICLES
 
 NAMES = (*CYCLES.names(), *controller_names(), *VEHICLES.names())
 
 
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 @given(st.text(max_size=30))
 def test_whatever_is_typed_only_an_allowed_name_is_suggested(text: str) -> None:
     assert nearest(text, NAMES) in ("", *NAMES)
 
 
+@settings(deadline=None)
 @given(st.sampled_from(NAMES), st.integers(0, 40), st.sampled_from("abcxyz-019"))
 def test_one_wrong_letter_is_found(name: str, place: int, letter: str) -> None:
     """Of the longer names another may be as near: it differs by that letter too."""
@@ -38,7 +37,5 @@ def test_the_beginning_of_one_name_is_near() -> None:
     assert nearest("xyz", NAMES) == ""
 
 
-def test_a_name_of_a_megabyte_takes_no_time() -> None:
-    start = perf_counter()
-    assert nearest("nycc" * 250_000, NAMES) == ""
-    assert perf_counter() - start < 1.0
+def test_of_an_endless_name_the_beginning_counts() -> None:
+    assert nearest("x" * LONGEST + "y" * 1_000_000, ["x" * LONGEST]) == "x" * LONGEST
