@@ -8,6 +8,21 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
+/* What the road beyond each block puts into the battery by itself. */
+static void take_refill(mpc_state *state)
+{
+    mpc_real beyond_j = REAL(0.0);
+    mpc_real spent_j = REAL(0.0);
+    for (int32_t k = MPC_LONG - 1; k >= 0; k--) {
+        mpc_stage_road *const road = &state->stage[MPC_SHORT + k].road;
+        const int32_t ends_block = ((k % MPC_CLASSES) == (MPC_CLASSES - 1)) ? 1 : 0;
+        beyond_j = (ends_block != 0) ? real_max(beyond_j - spent_j, REAL(0.0)) : beyond_j;
+        spent_j = ((ends_block != 0) ? REAL(0.0) : spent_j)
+                  + (road->duration_s * road->internal_off_w);
+        road->refill_j = (ends_block != 0) ? beyond_j : REAL(0.0);
+    }
+}
+
 /* Preview to stages: seconds first, then the classes of each block; past stages are masked. */
 void mpc_stages_take(mpc_state *state, const mpc_in *in)
 {
@@ -24,6 +39,7 @@ void mpc_stages_take(mpc_state *state, const mpc_in *in)
         stage->road.rises = seen;
         stage->road.fall_j = REAL(0.0);
         stage->road.rise_j = (k == (MPC_SHORT - 1)) ? in->short_rise_j : REAL(0.0);
+        stage->road.refill_j = REAL(0.0);
     }
     for (int32_t k = 0; k < MPC_LONG; k++) {
         mpc_stage *const stage = &state->stage[MPC_SHORT + k];
@@ -42,6 +58,7 @@ void mpc_stages_take(mpc_state *state, const mpc_in *in)
         stage->road.fall_j = (ends_block != 0) ? in->long_fall_j[k] : -NO_LIMIT_J;
         stage->road.rise_j = (ends_block != 0) ? in->long_rise_j[k] : -NO_LIMIT_J;
     }
+    take_refill(state);
 }
 
 /* The last good preview, some seconds later: short stages move up and are masked at the end. */

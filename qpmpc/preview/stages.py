@@ -53,6 +53,24 @@ class Stages:
     fall_j: NDArray[np.float64]
     rise_j: NDArray[np.float64]
 
+    @property
+    def refill_j(self) -> NDArray[np.float64]:
+        """Energy that the road beyond each block puts into the battery by itself, J; shape (n,).
+
+        With b+1 the block after b, and l from its statistics,
+
+            R_b = max(R_b+1 - sum of h l over block b+1, 0)
+
+        0 at the last block, for seconds, and inside blocks.
+        """
+        spent_j = self.duration_s * self.internal_off_w
+        ends = np.flatnonzero(self.fall_j > 0.0)
+        found, after_j = np.zeros(len(spent_j)), 0.0
+        for end, following in zip(ends[-2::-1], ends[:0:-1], strict=True):
+            after_j = max(after_j - float(spent_j[end + 1 : following + 1].sum()), 0.0)
+            found[end] = after_j
+        return found
+
     def arrival_s(self, short_stages: int) -> int | None:
         """Seconds until arrival, None where that is beyond the first `short_stages` of 1 s."""
         count = len(self.seconds_w(short_stages))

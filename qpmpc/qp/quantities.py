@@ -34,6 +34,7 @@ STAGE = (
     "rises",
     "fall_j",
     "rise_j",
+    "refill_j",
 )
 ABOUT = ("t_cl_degc", "fuel_g_per_s", "p_eng_w", "t_cl_start_degc", "t_cl_end_degc")
 FLOOR = ("floor_degc", "highest_floor_degc")

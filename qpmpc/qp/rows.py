@@ -73,13 +73,15 @@ missing_w = net_w - battery_discharge_max_w
 waste_g_per_s = where(highest_floor_degc > t_min_degc, 0.0, MOOT_G_PER_S)
 
 # SOC limits tightened by the swing inside a block, with a reserve at the end of forecast ones, the
-# whole of it where the coolant may limit the engine, and the terminal band, no higher than charging
-# all the way leads to: a limit above that is moot; inside a block there is none, or -1 and 2
+# whole of it where the coolant may limit the engine, less what the road beyond refills; and the
+# terminal band, no higher than charging all the way leads to: a limit above that is moot; inside a
+# block there is none, or -1 and 2
 strongest_w = max(net_w - engine_max_w, -battery_charge_max_w)
 spent_soc = running(duration_s * pwa_battery(strongest_w) / battery_energy_j)
 reach_soc = start_soc - spent_soc - reach_margin_soc
-reserve_soc = soc_reserve * where(about_t_cl_degc > thermostat_open_degc, 1.0, COOL_SHARE)
-limit_soc = max(soc_min + fall_j / battery_energy_j, -1.0) + where(fall_j > 0.0, reserve_soc, 0.0)
+wanted_soc = soc_reserve * where(about_t_cl_degc > thermostat_open_degc, 1.0, COOL_SHARE)
+reserve_soc = where(fall_j > 0.0, max(wanted_soc - refill_j / battery_energy_j, 0.0), 0.0)
+limit_soc = max(soc_min + fall_j / battery_energy_j, -1.0) + reserve_soc
 top_soc = min(soc_max - rise_j / battery_energy_j, 2.0)
 last_low_soc = where(soc_penalty_g > 0.0, limit_soc, terminal_soc_low)
 last_high_soc = where(soc_penalty_g > 0.0, top_soc, terminal_soc_high)

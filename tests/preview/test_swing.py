@@ -161,3 +161,32 @@ def test_descents_inside_a_block_find_room_in_a_small_battery(controller, of) ->
     )
     assert run.summary()["friction_brake_j"] < 1e3
     assert run.trajectory.soc.max() > 0.79  # it needs all the room that there is
+
+
+def blocks_of(*demands: list[float]) -> StageBuilder:
+    """Blocks of four seconds beyond a short horizon of two."""
+    demand = np.concatenate([[EASY_W, EASY_W], *demands])
+    assert len(demand) % 4 == 0
+    trace = Trace(demand, np.full(len(demand), 10.0))
+    layout = HorizonSettings(short_stages=2, blocks=len(demand) // 4, swing_share=1.0)
+    return StageBuilder(CAR, trace, trace, layout)
+
+
+def test_braking_beyond_a_block_refills_less_what_driving_before_it_takes() -> None:
+    """By itself, with the engine off: driving after the braking takes nothing back."""
+    easy, braking = [EASY_W] * 4, [BRAKING_W] * 4
+    stages = blocks_of([EASY_W] * 2, easy, braking, braking, easy).at(0)
+    of_block = stages.refill_j[2:].reshape(5, 3)
+    assert np.all(of_block[:, :2] == 0.0)
+    before_braking_j = 8.0 * BRAKED_J
+    expected = [before_braking_j - 4.0 * EASY_J, before_braking_j, 4.0 * BRAKED_J, 0.0, 0.0]
+    np.testing.assert_allclose(of_block[:, 2], expected)
+    assert np.all(stages.refill_j[:2] == 0.0)
+
+
+def test_no_block_ahead_no_refill() -> None:
+    builder = blocks_of([BRAKING_W] * 2, [BRAKING_W] * 4)
+    assert builder.at(0).refill_j.max() == pytest.approx(4.0 * BRAKED_J)
+    assert np.all(builder.at(builder.steps - 2).refill_j == 0.0)
+    alone = HorizonSettings(short_stages=2, blocks=0, block_s=0)
+    assert np.all(StageBuilder(CAR, NYCC, NYCC, alone).at(0).refill_j == 0.0)

@@ -198,6 +198,24 @@ def test_ends_of_blocks_keep_a_reserve_of_charge_more_where_the_thermostat_opens
     assert planned[-1] == pytest.approx(trip.soc_init)
 
 
+def test_what_the_road_beyond_refills_needs_no_reserve():
+    """Braking beyond the last block but one halves its reserve, and leaves the one before none."""
+    qp, steady = _qp(soc_reserve=0.5), BUILDER.at(0)
+    ends = np.arange(BUILDER.settings.short_stages + 2, qp.stages, 3)[-3:]
+    unit = 0.25 * (VEHICLE.trip.soc_init - VEHICLE.battery.soc_min)  # with a closed thermostat
+    internal_off_w = steady.internal_off_w.copy()
+    for end, refilled in ((ends[2], 0.5 * unit), (ends[1], 9.0 * unit)):
+        of_block = slice(end - 2, end + 1)
+        internal_off_w[of_block] = 0.0
+        internal_off_w[end] = -refilled * MODEL.battery_energy_j / steady.duration_s[end]
+    about = replace(_about(), t_cl_degc=np.full(qp.stages, 60.0))
+    data = qp.update(replace(steady, internal_off_w=internal_off_w), 0.6, 60.0, about)
+    lower = (data.lower / data.scaling.row).reshape(qp.stages, -1)[:, qp.rows.first("box_soc")]
+    swing = steady.fall_j / MODEL.battery_energy_j
+    kept = lower - VEHICLE.battery.soc_min - swing
+    assert kept[ends[:2]] == pytest.approx([0.0, 0.5 * unit], abs=1e-12)
+
+
 def test_soc_keeps_the_swing_from_its_limits_at_the_ends_of_blocks_alone():
     qp = _qp(soc_reserve=0.0)
     stages = BUILDER.at(0)

@@ -233,6 +233,13 @@ class Curves:
     alpha: PwaFit
 
 
+def _refill_j(road: Horizon, k: int) -> float:
+    """Most that braking puts into the battery from a block's end k to a later one, engine off."""
+    ends = np.flatnonzero(road.low_j > 0.0)
+    stored = -np.cumsum(road.h * road.off_w)
+    return float(np.max(stored[ends[ends >= k]]) - stored[k])
+
+
 def _heat_reserve_k(equations: Equations) -> float:
     """What the coolant loses in five minutes at 8 m/s with an engine that feeds only auxiliaries.
 
@@ -400,7 +407,8 @@ def stage_program(
         if road.low_j[k] > 0.0:  # a block ends: a reserve is left, half of it where cool
             part = 1.0 if t0 > th.thermostat_open_degc else 0.5
             lower = min(vehicle.trip.soc_init, target)
-            low += part * qp.soc_reserve * max(lower - battery.soc_min, 0.0)
+            reserve = part * qp.soc_reserve * max(lower - battery.soc_min, 0.0)
+            low += max(reserve - _refill_j(road, k) / energy, 0.0)
         if k == n - 1:
             low = max(qp.terminal_low * target, battery.soc_min)
             high = min(qp.terminal_high * target, battery.soc_max)

@@ -283,7 +283,8 @@ class NlpProblem:
         energy_j = maps.energy_j(trip.soc_mean)
         reserve = settings.soc_reserve * max(trip.soc_lower_end - battery.soc_min, 0.0)
         low = np.maximum(battery.soc_min + stages.fall_j / energy_j, EMPTY)
-        low += np.where(stages.fall_j > 0.0, reserve * np.where(is_hot, 1.0, COOL_SHARE), 0.0)
+        kept = reserve * np.where(is_hot, 1.0, COOL_SHARE) - stages.refill_j / energy_j
+        low += np.where(stages.fall_j > 0.0, np.maximum(kept, 0.0), 0.0)
         high = np.minimum(battery.soc_max - stages.rise_j / energy_j, FULL)
         if not settings.soc_penalty_g:
             low[-1] = max(settings.terminal_low * trip.soc_target, battery.soc_min)
