@@ -1,9 +1,12 @@
 """Picture of a board's log; it needs matplotlib."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.figure import Figure
 
 from qpmpc.codegen.board.check import BoardResult
+from qpmpc.report.charts import Panel, Series, held, over_time
 from qpmpc.report.style import BLUE, GREY, VERMILION, png, tidy
 
 
@@ -34,3 +37,17 @@ def draw_board(result: BoardResult) -> bytes:
         f"{data['cycle']}: {data['controller']} {data['precision']} on {log.board}", fontsize=11
     )
     return png(figure)
+
+
+def board_chart(result: BoardResult) -> dict[str, Any]:
+    """Return the same for the page to draw."""
+    log = result.log
+    in_ms = result.milliseconds(1.0)
+    label = f"{log.unit} per step" if in_ms is None else "ms per step"
+    times = Series("step", held(log.step * (in_ms or 1.0)), BLUE, stepped=True)
+    power = [
+        Series("here", held(result.expected.power_w / 1e3), GREY, "here", stepped=True),
+        Series("board", held(log.power_w / 1e3), VERMILION, "board", stepped=True),
+    ]
+    groups = [{"name": each.name, "color": each.color} for each in power]
+    return over_time([Panel(label, [times]), Panel("engine power, kW", power)], groups)

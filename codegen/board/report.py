@@ -103,6 +103,30 @@ def board_lines(data: dict[str, Any]) -> list[str]:
     return [*lines, *data["remarks"]]
 
 
+def board_answer(data: dict[str, Any]) -> list[str]:
+    """Return whether the board computes what this machine does, and in what time."""
+    commands, worst = data["commands"], data["times"]["both"]
+    differ, seconds = len(commands["differ_by_more"]), data["seconds"]
+    if differ:
+        first = f"{differ} of {seconds} commands differ from this machine's by more than round-off."
+    elif commands["equal_to_the_bit"] == seconds:
+        first = f"All {seconds} commands equal this machine's to the bit."
+    else:
+        first = (
+            f"All {seconds} commands agree with this machine's, "
+            f"{commands['equal_to_the_bit']} of them to the bit."
+        )
+    share = worst["max_share_of_second_percent"]
+    took = "" if share is None else f", {share:.3g} % of it"
+    return [
+        first,
+        f"The longest second took {worst['max']:,} {data['unit']}{took}.",
+        f"A fallback drove in {data['fallback_seconds']} s."
+        if data["fallback_seconds"]
+        else "No fallback drove.",
+    ]
+
+
 def write_board(result: BoardResult, folder: Path) -> list[str]:
     """Write seconds, figures and, with matplotlib, picture and report; returns remarks."""
     data = result.summary()
@@ -111,14 +135,16 @@ def write_board(result: BoardResult, folder: Path) -> list[str]:
     write_text(folder / f"{stem}.json", json_text(data))
     if find_spec("matplotlib") is None:
         return [f"{folder / stem}.csv, .json written; {NO_MATPLOTLIB}"]
-    from qpmpc.codegen.board.picture import draw_board
+    from qpmpc.codegen.board.picture import board_chart, draw_board
 
     picture = draw_board(result)
     write_bytes(folder / f"{stem}.png", picture)
     page = html_page(
         "qpmpc.codegen.board",
         "board.html.j2",
-        heading=board_heading(data),
+        title=board_heading(data),
+        answer=board_answer(data),
+        chart=board_chart(result),
         vehicle=data["vehicle"],
         unit=data["unit"],
         header=HEADER[1:],

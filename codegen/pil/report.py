@@ -1,6 +1,5 @@
 """Table, CSV, JSON, picture and HTML page of processor-in-the-loop runs."""
 
-from base64 import b64encode
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,12 +11,9 @@ from qpmpc.controllers.monitor import Flag
 from qpmpc.controllers.settings import MhQpSettings
 from qpmpc.files import json_text, write_bytes, write_text
 from qpmpc.report.columns import violations_text
-from qpmpc.report.html import html_page
-from qpmpc.report.provenance import provenance
 from qpmpc.report.table import ShownTable
 
 FLIPS_SHOWN = 8
-SHOWN_CYCLES_AN_INSTRUCTION = 1.5
 NO_MATPLOTLIB = (
     "no picture and no report: matplotlib is not installed (pip install 'qpmpc-iptm[plot]')"
 )
@@ -73,11 +69,13 @@ def write_pil(result: PilResult, folder: Path) -> list[str]:
     write_text(folder / f"{stem}.json", json_text(result.summary()))
     if find_spec("matplotlib") is None:
         return [f"{folder / stem}.csv, .json written; {NO_MATPLOTLIB}"]
+    from qpmpc.codegen.pil.page import pil_page
     from qpmpc.codegen.pil.pictures import draw_pil
 
     picture = draw_pil(result)
     write_bytes(folder / f"{stem}.png", picture)
-    write_text(folder / f"{stem}.html", _html(result, [result.summary()], picture))
+    page = pil_page(result, pil_lines(result), [result.summary()], picture)
+    write_text(folder / f"{stem}.html", page)
     return [f"{folder / stem}.csv, .json, .png, .html written"]
 
 
@@ -91,13 +89,16 @@ def write_pareto(pareto: Pareto, folder: Path) -> list[str]:
     write_text(folder / f"{stem}.json", json_text(data))
     if find_spec("matplotlib") is None:
         return [f"{folder / stem}.json written; {NO_MATPLOTLIB}"]
+    from qpmpc.codegen.pil.page import pil_page
     from qpmpc.codegen.pil.pictures import draw_pareto, draw_pil
 
     default = MhQpSettings().admm.iterations
     shown = min(pareto.results, key=lambda result: abs(result.iterations - default))
     picture = draw_pareto(data["runs"])
     write_bytes(folder / f"{stem}.png", picture)
-    page = _html(shown, data["runs"], draw_pil(shown), picture, pareto.dp_fuel_g)
+    page = pil_page(
+        shown, pil_lines(shown), data["runs"], draw_pil(shown), picture, pareto.dp_fuel_g
+    )
     write_text(folder / f"{stem}.html", page)
     return [f"{folder / stem}.json, .png, .html written"]
 
@@ -127,30 +128,6 @@ def pareto_table(rows: Sequence[dict[str, Any]]) -> ShownTable:
             ", ".join(remarks),
         )
     return table
-
-
-def _html(
-    shown: PilResult,
-    rows: Sequence[dict[str, Any]],
-    run_picture: bytes,
-    pareto_picture: bytes = b"",
-    dp_fuel_g: float = 0.0,
-) -> str:
-    """Return the report: one self-contained page."""
-    times = rows[0]["milliseconds_estimated"]
-    return html_page(
-        "qpmpc.codegen.pil",
-        "pil.html.j2",
-        cycle=shown.run.cycle,
-        vehicle=shown.run.vehicle,
-        rows=rows,
-        times=[t for t in times if t["cycles_per_instruction"] == SHOWN_CYCLES_AN_INSTRUCTION],
-        lines=pil_lines(shown),
-        run_picture=b64encode(run_picture).decode(),
-        pareto_picture=b64encode(pareto_picture).decode(),
-        dp_fuel_g=dp_fuel_g,
-        provenance=provenance(),
-    )
 
 
 def _csv(result: PilResult) -> str:

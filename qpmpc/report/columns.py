@@ -43,6 +43,11 @@ def _balanced(row: Row) -> str:
     return "fuel_soc_balanced_dp_g" if _is_priced(row) else "fuel_soc_balanced_g"
 
 
+def balanced_fuel_g(row: Row) -> float:
+    """Return the SOC-balanced fuel that runs are compared by."""
+    return float(row[_balanced(row)])
+
+
 def _range(low: float, high: float, digits: int) -> str:
     return f"{low:.{digits}f}..{high:.{digits}f}"
 

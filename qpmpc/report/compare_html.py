@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from qpmpc.controllers.settings import ControllerSettings
+from qpmpc.report.answer import comparison_answer
+from qpmpc.report.charts import run_chart
 from qpmpc.report.columns import COMPARE_COLUMNS, Row, filled, notes
 from qpmpc.report.html import html_page, preformatted
 from qpmpc.report.parameter_rows import parameter_rows
@@ -40,6 +42,8 @@ def compare_html(
     return html_page(
         "qpmpc.report",
         "compare.html.j2",
+        title="Controllers compared",
+        answer=comparison_answer(rows),
         vehicle=vehicle,
         plant=runs[0].plant["name"] if runs[0].plant else "",
         columns=columns,
@@ -54,6 +58,9 @@ def compare_html(
         ],
         integral_percent=100.0 * INTEGRAL,
         pictures={cycle: b64encode(data).decode() for cycle, data in pictures.items()},
+        charts={
+            cycle: run_chart([run for run in runs if run.cycle == cycle]) for cycle in pictures
+        },
         parameters=[row for section in parameter_rows(vehicle) for row in section],
         settings=preformatted(json.dumps(settings.model_dump(include=names), indent=2)),
         provenance=provenance(),

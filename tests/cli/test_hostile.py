@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from hostile import AS_SHOWN, TEXT, is_harmless
+from pages import assert_self_contained
 
 OWN_STYLE = re.compile(r"\x1b\[[0-9;?]*[mKAhl]")  # colours, and the cursor of a progress bar
 
@@ -130,7 +131,8 @@ def test_reports_and_json(cli, strict_json, hostile_trip, hostile_car, tmp_path)
     assert strict_json(done.out)["runs"][0]["cycle"] == TEXT  # as data it is what it was
     page = (folder / "compare.html").read_text("utf-8")
     assert is_harmless(page)
-    assert "<script>" not in page
+    charts = assert_self_contained(page).charts
+    assert charts[0]["panels"][1]["label"].startswith("rule-based")
     assert "<b>" not in page
     assert AS_SHOWN.replace("<b>", "&lt;b&gt;") in page
     assert (folder / f"{TEXT}.png").stat().st_size > 1000  # "$x^$" would be a broken formula

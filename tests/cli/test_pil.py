@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from board_log import IDENTITY, bodies, text_of
+from pages import assert_self_contained
 
 import qpmpc.codegen.pil.loop as loop
 from qpmpc.codegen import firmware
@@ -32,7 +33,7 @@ def test_one_run_is_reported_and_written(cli, trip, tmp_path):
     rows = (out / "pil_short_f32.csv").read_text().splitlines()
     assert len(rows) == 1 + 48
     html = (out / "pil_short_f32.html").read_text()
-    assert "http" not in html  # nothing is fetched from elsewhere
+    assert_self_contained(html)
     assert "data:image/png;base64," in html
     figures = json.loads((out / "pil_short_f32.json").read_text())
     assert f"{figures['instructions']['median']:,}" in html

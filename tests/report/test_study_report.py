@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from hostile import AS_SHOWN, TEXT, is_harmless
-from pages import Page
+from pages import Page, assert_self_contained
 from pandas import DataFrame
 from synthetic_study import SCALE, SHIFT_PERCENT, Study, failing, planned, synthetic
 
@@ -255,7 +255,8 @@ def test_hostile_names_are_inert(tmp_path):
     source = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert is_harmless(source.replace("\u2026", ""))
     page = Page(source)
-    assert "script" not in {tag for tag, _ in page.tags}
+    assert_self_contained(source)
+    assert "alert" not in page.programs[0]
     assert AS_SHOWN.partition("\n")[0] in page.text
     assert is_harmless((tmp_path / "out" / "summary.md").read_text("utf-8"))
     assert "<script>" not in (tmp_path / "out" / "summary.md").read_text("utf-8")

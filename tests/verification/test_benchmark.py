@@ -6,6 +6,7 @@ from io import BytesIO
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from pages import assert_self_contained
 
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle, load_cycle
@@ -114,7 +115,7 @@ def test_report_is_self_contained(driven, short, tmp_path):
     result = Benchmark([driven], rows, growth, solvers, anytime, ["<qpalm>"])
     write_benchmark(result, VEHICLE, tmp_path)
     page = (tmp_path / "benchmark.html").read_text("utf-8")
-    assert "http" not in page
+    assert_self_contained(page)
     assert "osqp K=20" in page
     for name in ("pareto", "histogram", "anytime", "growth"):
         assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")

@@ -52,11 +52,34 @@ def figure(value: float) -> str:
     return f"{value:.3g}"
 
 
+def verification_answer(results: Results) -> list[str]:
+    """Return whether the claims hold, which do not, and how far that was tested."""
+    checks = results.checks
+    failed = [check.name for check in checks if not check.passed]
+    skipped = [check.name for check in checks if check.skipped]
+    held = len(checks) - len(failed) - len(skipped)
+    if not held and not failed:
+        first = "Nothing was tested."
+    elif failed:
+        first = f"{len(failed)} of {len(checks)} checks failed: {', '.join(failed)}."
+    else:
+        first = f"All {held} claims that were tested hold."
+    sentences = [first]
+    if failed:
+        sentences.append(f"{held} hold.")
+    if skipped:
+        sentences.append(f"Not tested on this machine: {', '.join(skipped)}.")
+    sentences.append("Quick run: fewer cycles and samples." if results.quick else "Full run.")
+    return [*sentences, f"It took {sum(results.seconds):.0f} s."]
+
+
 def verification_html(results: Results) -> str:
     """Return the report."""
     return html_page(
         "qpmpc.verification.checks",
         "verify.html.j2",
+        title="Verification",
+        answer=verification_answer(results),
         results=results,
         figure=figure,
         provenance=provenance(),

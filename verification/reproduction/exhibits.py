@@ -27,6 +27,7 @@ class Picture:
     title, caption : for the report
     figure : drawn
     data : columns that it was drawn from; shorter ones are filled up with empty cells
+    chart : the same for the page to draw, see `qpmpc.report.charts`; None: the picture alone
     """
 
     name: str
@@ -34,6 +35,7 @@ class Picture:
     caption: str
     figure: Figure
     data: Mapping[str, Sequence[Any]]
+    chart: dict[str, Any] | None = None
 
     def write(self, folder: Path) -> bytes:
         """Write PNG, SVG and CSV; returns the PNG."""

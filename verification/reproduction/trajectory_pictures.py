@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from qpmpc.report.charts import run_chart
 from qpmpc.report.style import BLACK, BLUE, ORANGE, PURPLE
 from qpmpc.verification.reproduction.drawing import (
     engine_panel,
@@ -78,6 +79,9 @@ def all_picture(study: Study, cycle: str) -> Picture:
         "SOC, coolant and fuel of the rules, the baseline, both multi-horizon grids and DP.",
         finish(figure, axes, f"{cycle}: SOC, coolant, fuel", soc),
         series(study, cycle, labels),
+        run_chart(
+            [study.runs[cycle, name] for name in labels], labels, lambda name, _: style(name)
+        ),
     )
 
 

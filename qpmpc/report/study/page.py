@@ -37,15 +37,21 @@ class Section:
     folded: Sequence[tuple[str, Sequence[Table]]] = field(default=())
 
 
-def page(title: str, quiet: str, sections: Sequence[Section]) -> str:
+def page(title: str, answer: Sequence[str], quiet: str, sections: Sequence[Section]) -> str:
     """Return the page; all text is escaped.
 
     Parameters
     ----------
-    quiet : the line below the title
+    answer : what was found, in sentences, the first the most important
+    quiet : the line below it
     """
     return html_page(
-        "qpmpc.report.study", "page.html.j2", title=title, quiet=quiet, sections=sections
+        "qpmpc.report.study",
+        "page.html.j2",
+        title=title,
+        answer=answer,
+        quiet=quiet,
+        sections=sections,
     )
 
 

@@ -89,7 +89,7 @@ def comparison_page(comparison: Mapping[str, Any], pictures: Mapping[str, bytes]
     quiet = f"A: {a['name']}, {a['runs']:,} runs. B: {b['name']}, {b['runs']:,} runs."
     sections = [
         Section(
-            paragraphs=[*_result_texts(comparison), _compared_text(comparison)],
+            paragraphs=[_compared_text(comparison)],
             tables=tables,
             remarks=comparison["remarks"],
         ),
@@ -111,7 +111,7 @@ def comparison_page(comparison: Mapping[str, Any], pictures: Mapping[str, bytes]
             for side, study in (("A", a), ("B", b))
         ),
     ]
-    return page("Two studies compared", quiet, sections)
+    return page("Two studies compared", _result_texts(comparison), quiet, sections)
 
 
 def _result_texts(comparison: Mapping[str, Any]) -> list[str]:

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Any
 
 from qpmpc.report.columns import NONE, number
 from qpmpc.report.html import preformatted
+from qpmpc.report.study.answer import runs_text, study_answer
 from qpmpc.report.study.figures import (
     ABOVE_DP,
-    LIMITS,
     MEASURES,
     SAVING,
     Measure,
@@ -103,7 +103,7 @@ def study_page(
             ],
         ),
     ]
-    return page(study.name, quiet, sections)
+    return page(study.name, study_answer(summary), quiet, sections)
 
 
 def _first(study: Study, summary: Mapping[str, Any]) -> Section:
@@ -112,43 +112,10 @@ def _first(study: Study, summary: Mapping[str, Any]) -> Section:
     title = f"{summary['main_measure']['title']}, {summary['main_measure']['unit']}"
     title = title[0].upper() + title[1:]
     return Section(
-        paragraphs=[*([study.description] if study.description else []), *counts_text(summary)],
+        paragraphs=[study.description] if study.description else [],
         tables=[Table(header, rows, names, title + " [95 % confidence interval]")] if rows else [],
         remarks=summary["remarks"] if rows else [],
     )
-
-
-def counts_text(summary: Mapping[str, Any]) -> list[str]:
-    """Return the counts of a study in plain words."""
-    counts = summary["counts"]
-    done, failed, missing = counts["done"], counts["failed"], counts["missing"]
-    if done + failed == 0:
-        return [NO_RUNS, *([f"{missing:,} runs were planned."] if missing else [])]
-    ends = "No run failed." if failed == 0 else f"{_runs(failed)} failed, see below."
-    texts = [f"{_runs(done)} finished of {counts['planned']:,} planned. {ends}"]
-    if missing:
-        texts[0] += f" {_runs(missing)} were not made: the study is not complete."
-    if done == 0:
-        return [*texts, "There are no figures: every run failed."]
-    by_limit = ", ".join(
-        f"{text} in {counts['violations'][limit]:,}"
-        for limit, text in LIMITS.items()
-        if counts["violations"][limit]
-    )
-    violated = counts["with_violation"]
-    texts.append(
-        (f"A limit was violated in {_runs(violated)}: {by_limit}." if violated else
-         "No limit was violated.")
-        + (f" A fallback drove for a second or more in {_runs(counts['with_fallback'])}."
-           if counts["with_fallback"] else " No fallback drove.")
-        + (f" {_runs(counts['not_comparable'])} cannot be compared in fuel."
-           if counts["not_comparable"] else "")
-    )  # fmt: skip
-    return texts
-
-
-def _runs(count: int) -> str:
-    return "1 run" if count == 1 else f"{count:,} runs"
 
 
 def _distribution_text(pictures: Mapping[str, bytes]) -> list[str]:
@@ -247,7 +214,7 @@ def _failed(frame: "DataFrame", table: "DataFrame") -> Section:
     if len(failed) == 0:
         return Section("Failed runs", ["No run failed."])
     shown_rows = failed.head(MOST_FAILED)
-    text = f"{_runs(len(failed))} failed"
+    text = f"{runs_text(len(failed))} failed"
     text += f"; the first {MOST_FAILED} are shown." if len(failed) > MOST_FAILED else "."
     return Section(
         "Failed runs", [text], [failed_table(shown_rows)], texts=commands(frame, shown_rows)

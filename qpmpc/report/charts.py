@@ -1,0 +1,174 @@
+"""Charts that a page draws itself, as plain data for `web/chart.js`: zoom, cursor, groups.
+
+A chart is panels over one axis. Lines that belong to a group (a controller, say) are left out with
+it. The static picture of the same data stays in the page, for print and without scripts.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from qpmpc.report.style import BLUE, GREY, LIMIT, ORANGE, line_style
+from qpmpc.results import Run
+from qpmpc.shown import shown
+
+DIGITS = 5  # of a value in a page
+DASHED = [6, 4]
+
+
+@dataclass(frozen=True)
+class Series:
+    """A line.
+
+    Attributes
+    ----------
+    values : one for each value of the axis; those that are not finite leave a gap
+    group : what it is left out with; empty: never
+    stepped : each value holds until the next
+    aside : shown in its panel, but alone no reason to show the panel
+    """
+
+    name: str
+    values: list[float | None]
+    color: str
+    group: str = ""
+    dash: list[int] = field(default_factory=list)
+    stepped: bool = False
+    fill: bool = False
+    aside: bool = False
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Lines over each other; `label` names the quantity, with its unit."""
+
+    label: str
+    series: list[Series]
+    log: bool = False
+    height: int = 170
+
+
+def over_time(panels: Sequence[Panel], groups: Sequence[dict[str, Any]] = ()) -> dict[str, Any]:
+    """Return a chart over the seconds of a trip.
+
+    Parameters
+    ----------
+    groups : name, color and dash of what can be left out
+    """
+    count = max(len(series.values) for panel in panels for series in panel.series)
+    data: dict[str, Any] = {
+        "count": count,
+        "x_label": "time, s",
+        "x_name": "s",
+        "groups": list(groups),
+    }
+    data["panels"] = [asdict(panel) for panel in panels]
+    return _plain(data)
+
+
+def scatter(
+    x: ArrayLike,
+    label: str,
+    panel: Panel,
+    labels: Sequence[str],
+    groups: Sequence[dict[str, Any]],
+) -> dict[str, Any]:
+    """Return a chart of points on a logarithmic axis; x rises, each point has a name."""
+    data = {
+        "x": numbers(x),
+        "x_label": label,
+        "x_log": True,
+        "points": True,
+        "labels": list(labels),
+        "groups": list(groups),
+        "panels": [asdict(panel)],
+    }
+    return _plain(data)
+
+
+def run_chart(
+    runs: Sequence[Run],
+    names: Sequence[str] = (),
+    style_of: Callable[[str, int], dict[str, Any]] = line_style,
+) -> dict[str, Any]:
+    """Return speed, power split, SOC, coolant and fuel of runs on one cycle.
+
+    Parameters
+    ----------
+    names : of the runs; without them those of their controllers
+    style_of : matplotlib's keywords for a line, of its name and place
+    """
+    names = names or [run.controller for run in runs]
+    first, styles = runs[0], [_line(name, style_of(name, i)) for i, name in enumerate(names)]
+    speed = Series("speed", held(3.6 * first.trajectory.speed_mps), GREY, fill=True, stepped=True)
+    panels = [Panel("speed, km/h", [speed], height=110)]
+    for run, style in zip(runs, styles, strict=True):
+        panels.append(Panel(f"{style['group']}: power, kW", _powers(run, style["group"])))
+    battery, thermal = first.vehicle.battery, first.vehicle.thermal
+    states = (
+        ("SOC", "soc", (battery.soc_min, battery.soc_max)),
+        ("coolant, °C", "t_cl_degc", (thermal.t_cl_min_degc, thermal.t_cl_max_degc)),
+    )
+    for label, key, limits in states:
+        lines = [
+            Series(style["group"], numbers(getattr(run.trajectory, key)), **style)
+            for run, style in zip(runs, styles, strict=True)
+        ]
+        count = len(first.trajectory.soc)
+        named = zip(("least allowed", "most allowed"), limits, strict=True)
+        panels.append(Panel(label, lines + [_limit(n, value, count) for n, value in named]))
+    fuel = [
+        Series(style["group"], numbers([0.0, *np.cumsum(run.trajectory.fuel_g)]), **style)
+        for run, style in zip(runs, styles, strict=True)
+    ]
+    panels.append(Panel("fuel burnt, g", fuel))
+    groups = [
+        {"name": style["group"], "color": style["color"], "dash": style["dash"]} for style in styles
+    ]
+    return over_time(panels, groups)
+
+
+def numbers(values: ArrayLike) -> list[float | None]:
+    """Return values with the digits that a picture shows; None for those not finite."""
+    found = np.asarray(values, dtype=float)
+    return [float(f"{v:.{DIGITS}g}") if np.isfinite(v) else None for v in found.tolist()]
+
+
+def held(values: ArrayLike) -> list[float | None]:
+    """Return values of steps, the last held to the end of its second."""
+    found = numbers(values)
+    return [*found, *found[-1:]]
+
+
+def _line(name: str, style: dict[str, Any]) -> dict[str, Any]:
+    dash = DASHED if style["linestyle"] != "-" else []
+    return {"color": style["color"], "dash": dash, "group": name}
+
+
+def _powers(run: Run, group: str) -> list[Series]:
+    trajectory = run.trajectory
+    return [
+        Series("demand", held(trajectory.demand_w / 1e3), GREY, group, stepped=True, fill=True),
+        Series("engine", held(trajectory.p_eng_w / 1e3), ORANGE, group, stepped=True, fill=True),
+        Series("battery", held(trajectory.p_bat_w / 1e3), BLUE, group, stepped=True),
+    ]
+
+
+def _limit(name: str, value: float, count: int) -> Series:
+    return Series(name, numbers([value] * count), str(LIMIT["color"]), dash=[2, 3], aside=True)
+
+
+def _plain(data: dict[str, Any]) -> dict[str, Any]:
+    """Return the same with every text as pages show it: scripts put it into the page as it is."""
+    return {key: _shown(value) for key, value in data.items()}
+
+
+def _shown(value: Any) -> Any:
+    if isinstance(value, str):
+        return shown(value)
+    if isinstance(value, dict):
+        return _plain(value)
+    return [_shown(each) for each in value] if isinstance(value, list) else value
