@@ -50,4 +50,4 @@ def board_chart(result: BoardResult) -> dict[str, Any]:
         Series("board", held(log.power_w / 1e3), VERMILION, "board", stepped=True),
     ]
     groups = [{"name": each.name, "color": each.color} for each in power]
-    return over_time([Panel(label, [times]), Panel("engine power, kW", power)], groups)
+    return over_time([Panel(label, [times], zero=True), Panel("engine power, kW", power)], groups)

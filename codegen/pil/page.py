@@ -79,8 +79,8 @@ def pil_answer(rows: Sequence[dict[str, Any]]) -> list[str]:
     flips = len(row["on_off_flips"])
     return [
         f"A step takes {row['instructions']['max']:,} instructions at most, an estimated "
-        f"{time['milliseconds']:.2f} ms at {time['clock_mhz']} MHz; fuel is "
-        f"{_signed(row['fuel_difference_percent'])} that of the controller in Python.",
+        f"{time['milliseconds']:.2f} ms at {time['clock_mhz']} MHz; fuel "
+        f"{_against_python(row['fuel_difference_percent'])}.",
         f"Limits were violated: {violations_text(row)}." if violated else "No limit was violated.",
         f"A fallback drove in {fallback} of {row['steps']} s."
         if fallback
@@ -104,12 +104,11 @@ def _above(row: dict[str, Any]) -> str:
     return f"fuel {row['fuel_above_dp_percent']:.2f} % above dynamic programming"
 
 
-def _signed(percent: float) -> str:
-    """Return a difference in words that "that of" may follow."""
+def _against_python(percent: float) -> str:
     text = f"{abs(percent):.4f}"
     if float(text) == 0.0:
-        return "to 0.0001 %"
-    return f"{text} % {'below' if percent < 0.0 else 'above'}"
+        return "equals that of the controller in Python to 0.0001 %"
+    return f"is {text} % {'below' if percent < 0.0 else 'above'} that of the controller in Python"
 
 
 def _run_chart(result: PilResult) -> dict[str, Any]:
@@ -125,7 +124,11 @@ def _run_chart(result: PilResult) -> dict[str, Any]:
         ),
     ]
     panels = [
-        Panel("instructions per step, millions", [Series("step", held(count), BLUE, stepped=True)]),
+        Panel(
+            "instructions per step, millions",
+            [Series("step", held(count), BLUE, stepped=True)],
+            zero=True,
+        ),
         Panel("engine power, kW", power),
         Panel("command error, W", [Series("error", held(result.command_error_w), BLACK)]),
     ]

@@ -61,11 +61,8 @@ def _least(rows: Sequence[Row]) -> str:
     drove = [row for row in rows if row["controller"] != OPTIMUM]
     sound = [row for row in drove if is_sound(row)]
     if not sound:
-        return (
-            "No run"
-            + (" but the optimum's" if len(drove) < len(rows) else "")
-            + (" can be compared in fuel.")
-        )
+        but = " but the optimum's" if len(drove) < len(rows) else ""
+        return f"No run{but} can be compared in fuel."
     best = {}
     for cycle in cycles:
         own = [row for row in sound if row["cycle"] == cycle]
@@ -82,11 +79,9 @@ def _least(rows: Sequence[Row]) -> str:
         return f"On {cycles[0]}, {name} {burns} {fuel}{against}."
     if alone:
         return f"{name} drove {len(own)} of {len(cycles)} cycles comparably{against}."
-    where = (
-        f"all {len(cycles)}"
-        if won.count(name) == len(cycles)
-        else (f"{won.count(name)} of {len(cycles)}")
-    )
+    where = f"{won.count(name)} of {len(cycles)}"
+    if won.count(name) == len(cycles):
+        where = "both" if len(cycles) == 2 else f"all {len(cycles)}"
     return f"{name} burns least on {where} cycles{against}."
 
 
@@ -115,6 +110,8 @@ def _against(rows: Sequence[Row], own: Sequence[Row]) -> list[str]:
 def difference(least: float, most: float) -> str:
     """Return a range of percentages in words, "1.20 to 3.00 % less": positive is more fuel."""
     low, high = (f"{abs(value):.{DIGITS}f}" for value in (least, most))
+    if float(low) == float(high) == 0.0:
+        return f"{low} % more"
     if low == high and (least < 0.0) == (most < 0.0):
         return f"{low} % {'less' if least < 0.0 else 'more'}"
     if most <= 0.0:

@@ -43,11 +43,12 @@ class Series:
 
 @dataclass(frozen=True)
 class Panel:
-    """Lines over each other; `label` names the quantity, with its unit."""
+    """Lines over each other; `label` names the quantity, with its unit; `zero`: from 0 upwards."""
 
     label: str
     series: list[Series]
     log: bool = False
+    zero: bool = False
     height: int = 170
 
 
@@ -104,7 +105,7 @@ def run_chart(
     names = names or [run.controller for run in runs]
     first, styles = runs[0], [_line(name, style_of(name, i)) for i, name in enumerate(names)]
     speed = Series("speed", held(3.6 * first.trajectory.speed_mps), GREY, fill=True, stepped=True)
-    panels = [Panel("speed, km/h", [speed], height=110)]
+    panels = [Panel("speed, km/h", [speed], zero=True, height=110)]
     for run, style in zip(runs, styles, strict=True):
         panels.append(Panel(f"{style['group']}: power, kW", _powers(run, style["group"])))
     battery, thermal = first.vehicle.battery, first.vehicle.thermal
@@ -124,7 +125,7 @@ def run_chart(
         Series(style["group"], numbers([0.0, *np.cumsum(run.trajectory.fuel_g)]), **style)
         for run, style in zip(runs, styles, strict=True)
     ]
-    panels.append(Panel("fuel burnt, g", fuel))
+    panels.append(Panel("fuel burnt, g", fuel, zero=True))
     groups = [
         {"name": style["group"], "color": style["color"], "dash": style["dash"]} for style in styles
     ]
