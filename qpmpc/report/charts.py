@@ -70,6 +70,18 @@ def over_time(panels: Sequence[Panel], groups: Sequence[dict[str, Any]] = ()) ->
     return _plain(data)
 
 
+def lines(
+    x: ArrayLike,
+    label: str,
+    unit: str,
+    panels: Sequence[Panel],
+    groups: Sequence[dict[str, Any]],
+) -> dict[str, Any]:
+    """Return a chart of lines over any axis; x rises."""
+    data = {"x": numbers(x), "x_label": label, "x_name": unit, "groups": list(groups)}
+    return _plain(data | {"panels": [asdict(panel) for panel in panels]})
+
+
 def scatter(
     x: ArrayLike,
     label: str,

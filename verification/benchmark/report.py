@@ -100,7 +100,12 @@ def pareto_chart(found: Sequence[Point]) -> dict[str, Any] | None:
     return scatter(
         [point.worst_ms for point in shown],
         "worst step of all trips, ms",
-        Panel("SOC-balanced fuel above DP, %: median over trips", series, height=380),
+        Panel(
+            "SOC-balanced fuel above DP, %: median over trips",
+            series,
+            log=min(p.fuel for p in shown) > 0.0,
+            height=380,
+        ),
         labels,
         [{"name": name, "color": FAMILY_COLORS[name]} for name in families],
     )

@@ -63,7 +63,7 @@ def verification_answer(results: Results) -> list[str]:
     elif failed:
         first = f"{len(failed)} of {len(checks)} checks failed: {', '.join(failed)}."
     else:
-        first = f"All {held} claims that were tested hold."
+        first = f"All claims that were tested hold: {held}."
     sentences = [first]
     if failed:
         sentences.append(f"{held} hold.")

@@ -6,6 +6,7 @@ from typing import Any
 from qpmpc.report.columns import number
 from qpmpc.report.study.figures import LIMITS, value_text
 from qpmpc.report.study.markdown import NO_RUNS
+from qpmpc.results import OPTIMUM, REFERENCE
 
 MOST_GROUPS = 4
 
@@ -13,7 +14,9 @@ MOST_GROUPS = 4
 def study_answer(summary: Mapping[str, Any]) -> list[str]:
     """Return the main figure of each group, then counts: failed, violated, not comparable."""
     measure = summary["main_measure"]
-    told = [g for g in summary["groups"] if g["measures"][measure["key"]]["n"]]
+    groups = [g for g in summary["groups"] if g["measures"][measure["key"]]["n"]]
+    # the references are there to be compared with, unless nothing else is
+    told = [g for g in groups if g.get("controller") not in (REFERENCE, OPTIMUM)] or groups
     if not told:
         return counts_text(summary)
     parts = []

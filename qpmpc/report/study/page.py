@@ -3,6 +3,7 @@
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from qpmpc.report.html import html_page
 
@@ -26,6 +27,7 @@ class Section:
     pictures : name and PNG, in base64
     texts : heading and text in a fixed-width font
     folded : label and tables that a click opens
+    charts : by the names of the pictures that they stand for, see `qpmpc.report.charts`
     """
 
     title: str = ""
@@ -35,6 +37,7 @@ class Section:
     pictures: Sequence[tuple[str, str]] = ()
     texts: Sequence[tuple[str, str]] = ()
     folded: Sequence[tuple[str, Sequence[Table]]] = field(default=())
+    charts: Mapping[str, dict[str, Any]] = field(default_factory=dict)
 
 
 def page(title: str, answer: Sequence[str], quiet: str, sections: Sequence[Section]) -> str:

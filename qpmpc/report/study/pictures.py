@@ -55,10 +55,10 @@ def draw_distribution(table: "DataFrame", columns: Sequence[str], measure: Measu
     if len(drawn) == 0:
         return None
     low, high = shown_range(studied[measure.key].to_numpy(float))
-    panels = _panels(drawn, columns)
+    panels = panels_of(drawn, columns)
     figure = _figure(len(panels))
     grid = figure.subplots(len(panels), 2, squeeze=False, sharex=True)
-    styles = _styles(table)
+    styles = styles_of(table)
     for (title, lines), (counts, shares) in zip(panels, grid, strict=True):
         for controller, part in lines:
             values = np.sort(part[measure.key].to_numpy(float))
@@ -104,11 +104,11 @@ def draw_factor(
     if len(drawn) == 0:
         return None
     low, high = shown_range(drawn[measure.key].to_numpy(float))
-    panels = _panels(drawn, columns)
+    panels = panels_of(drawn, columns)
     numeric = is_numeric(drawn, column)
     rows = min(len(distinct(drawn, column)), MOST_BOXES)
     figure = _figure(len(panels), PANEL_IN if numeric else 0.22 * rows + 0.9)
-    styles = _styles(table)
+    styles = styles_of(table)
     for (title, lines), axes in zip(panels, _column(figure, len(panels)), strict=True):
         axes.set_title(title, loc="left", fontsize=9, fontweight="bold")
         if numeric:
@@ -164,11 +164,12 @@ def _column(figure: Figure, panels: int) -> list[Axes]:
     return found
 
 
-def _styles(table: "DataFrame") -> dict[str, dict[str, Any]]:
+def styles_of(table: "DataFrame") -> dict[str, dict[str, Any]]:
+    """Return the line of each controller, as keywords of matplotlib."""
     return {name: line_style(name, i) for i, name in enumerate(distinct(table, "controller"))}
 
 
-def _panels(
+def panels_of(
     table: "DataFrame", columns: Sequence[str]
 ) -> list[tuple[str, list[tuple[str, "DataFrame"]]]]:
     """Split into panels: a title, and the part of each controller."""

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from qpmpc.report.columns import NONE, number
 from qpmpc.report.html import preformatted
 from qpmpc.report.study.answer import runs_text, study_answer
+from qpmpc.report.study.distribution_chart import distribution_chart
 from qpmpc.report.study.figures import (
     ABOVE_DP,
     MEASURES,
@@ -89,7 +90,12 @@ def study_page(
     quiet = f"Study of {study.runs:,} runs, seed {study.seed}. Varied: {varied or 'nothing'}."
     sections = [
         _first(study, summary),
-        Section("Distributions", _distribution_text(pictures), pictures=chosen(pictures, "distr")),
+        Section(
+            "Distributions",
+            _distribution_text(pictures),
+            pictures=chosen(pictures, "distr"),
+            charts=_charts(table, summary, pictures),
+        ),
         _factors(summary, pictures, measure),
         _all_figures(summary),
         _worst(frame, table, study, measure, pictures, remarks),
@@ -120,8 +126,22 @@ def _first(study: Study, summary: Mapping[str, Any]) -> Section:
 
 def _distribution_text(pictures: Mapping[str, bytes]) -> list[str]:
     if any(name.startswith("distribution") for name in pictures):
-        return ["Left: share of the runs by value. Right: share of the runs up to a value."]
+        return [
+            "The value that a share of the runs does not exceed. In the pictures beside this page, "
+            "left: share of the runs by value; right: share of the runs up to a value."
+        ]
     return ["No run has a figure to draw."]
+
+
+def _charts(
+    table: "DataFrame", summary: Mapping[str, Any], pictures: Mapping[str, bytes]
+) -> dict[str, dict[str, Any]]:
+    """Return a chart for each picture of a distribution, by the names of `chosen`."""
+    return {
+        name.replace("_", " "): distribution_chart(table, summary["grouped_by"], measure)
+        for measure in MEASURES
+        if (name := f"distribution_{measure.key}") in pictures
+    }
 
 
 def _factors(
