@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from qpmpc.report.style import BLUE, GREY, LIMIT, ORANGE, line_style
+from qpmpc.report.style import BLUE, GREY, LIMIT, ORANGE, PURPLE, line_style
 from qpmpc.results import Run
 from qpmpc.shown import shown
 
@@ -43,12 +43,19 @@ class Series:
 
 @dataclass(frozen=True)
 class Panel:
-    """Lines over each other; `label` names the quantity, with its unit; `zero`: from 0 upwards."""
+    """Lines over each other; `label` names the quantity, with its unit.
+
+    Attributes
+    ----------
+    zero : 0 is always shown
+    span : least and greatest value of the scale; empty: as the lines need
+    """
 
     label: str
     series: list[Series]
     log: bool = False
     zero: bool = False
+    span: list[float] = field(default_factory=list)
     height: int = 170
 
 
@@ -117,9 +124,10 @@ def run_chart(
     names = names or [run.controller for run in runs]
     first, styles = runs[0], [_line(name, style_of(name, i)) for i, name in enumerate(names)]
     speed = Series("speed", held(3.6 * first.trajectory.speed_mps), GREY, fill=True, stepped=True)
-    panels = [Panel("speed, km/h", [speed], zero=True, height=110)]
-    for run, style in zip(runs, styles, strict=True):
-        panels.append(Panel(f"{style['group']}: power, kW", _powers(run, style["group"])))
+    panels = [Panel("speed, km/h", [speed, *_faults(runs)], zero=True, height=110)]
+    powers = [_powers(run, style["group"]) for run, style in zip(runs, styles, strict=True)]
+    span = _span(powers)
+    panels += [Panel(f"{each[0].group}: power, kW", each, span=span) for each in powers]
     battery, thermal = first.vehicle.battery, first.vehicle.thermal
     states = (
         ("SOC", "soc", (battery.soc_min, battery.soc_max)),
@@ -168,6 +176,28 @@ def _powers(run: Run, group: str) -> list[Series]:
         Series("engine", held(trajectory.p_eng_w / 1e3), ORANGE, group, stepped=True, fill=True),
         Series("battery", held(trajectory.p_bat_w / 1e3), BLUE, group, stepped=True),
     ]
+
+
+def _span(panels: Sequence[Sequence[Series]]) -> list[float]:
+    """Scale that all panels share, with some room."""
+    known = [v for panel in panels for line in panel for v in line.values if v is not None]
+    low, high = min(known), max(known)
+    room = 0.05 * (high - low) or 1.0
+    return [low - room, high + room]
+
+
+def _faults(runs: Sequence[Run]) -> list[Series]:
+    """Seconds of injected faults, as high as the speed; none without any."""
+    each = [fault for run in runs if run.faults for fault in run.faults["each"]]
+    if not each:
+        return []
+    speed_kmh = 3.6 * runs[0].trajectory.speed_mps
+    time_s = np.arange(len(speed_kmh))
+    there = np.zeros(len(time_s), dtype=bool)
+    for fault in each:
+        there |= (time_s >= fault["at_s"]) & (time_s < fault["at_s"] + fault["for_s"])
+    height = np.where(there, max(float(speed_kmh.max()), 1.0), 0.0)
+    return [Series("injected fault", held(height), PURPLE, stepped=True, fill=True)]
 
 
 def _limit(name: str, value: float, count: int) -> Series:

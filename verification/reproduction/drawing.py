@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from qpmpc.report.charts import run_chart
 from qpmpc.report.style import BLACK, GREEN, LIMIT, ORANGE, line_style, tidy
 from qpmpc.results import Run
 from qpmpc.verification.reproduction.study import Study
@@ -81,6 +82,12 @@ def finish(figure: Figure, axes: list[Axes], title: str, legend: Axes | None = N
         )
     figure.align_ylabels(axes)
     return figure
+
+
+def chart(study: Study, cycle: str, labels: list[str]) -> dict[str, Any]:
+    """Runs of several variants for the page to draw."""
+    runs = [study.runs[cycle, label] for label in labels]
+    return run_chart(runs, labels, lambda label, _: style(label))
 
 
 def series(study: Study, cycle: str, labels: list[str]) -> dict[str, Any]:

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from qpmpc.report.charts import run_chart
 from qpmpc.report.style import BLACK, BLUE, ORANGE, PURPLE
 from qpmpc.verification.reproduction.drawing import (
+    chart,
     engine_panel,
     finish,
     panels,
@@ -35,6 +35,7 @@ def baseline_picture(study: Study, cycle: str) -> Picture:
         "The baseline's SOC hardly moves: its penalty pulls it back at the end of every horizon.",
         finish(figure, axes, f"{cycle}: baseline MPC", soc),
         series(study, cycle, labels),
+        chart(study, cycle, labels),
     )
 
 
@@ -79,9 +80,7 @@ def all_picture(study: Study, cycle: str) -> Picture:
         "SOC, coolant and fuel of the rules, the baseline, both multi-horizon grids and DP.",
         finish(figure, axes, f"{cycle}: SOC, coolant, fuel", soc),
         series(study, cycle, labels),
-        run_chart(
-            [study.runs[cycle, name] for name in labels], labels, lambda name, _: style(name)
-        ),
+        chart(study, cycle, labels),
     )
 
 

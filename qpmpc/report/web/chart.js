@@ -69,7 +69,7 @@
         height: panel.height || 170,
         cursor: { sync: { key: `chart${number}` }, drag: { x: true, y: false } },
         legend: { live: true },
-        scales: { x: { time: false, distr: chart.x_log ? 3 : 1 }, y: { distr: panel.log ? 3 : 1, range: panel.zero ? (_, low, high) => [Math.min(low, 0), high > 0 ? 1.08 * high : 1] : undefined } },
+        scales: { x: { time: false, distr: chart.x_log ? 3 : 1 }, y: { distr: panel.log ? 3 : 1, range: panel.span && panel.span.length ? panel.span : panel.zero ? (_, low, high) => [Math.min(low, 0), high > 0 ? 1.08 * high : 1] : undefined } },
         axes: [axis({ label: panel.last ? chart.x_label : undefined, labelSize: 18, size: 30, values: chart.x_log ? (u, ticks) => ticks.map((t) => (t === null ? "" : String(Number(t.toPrecision(6))))) : undefined }), axis({ size: 56 })],
         series: [{ label: chart.labels ? "point" : "at", value: labelled(chart.x_name || "") }, ...panel.series.map(series)],
         hooks: { setScale: [(plot, key) => { if (key === "x" && plot.status === 1) zoom(plot.scales.x.min, plot.scales.x.max); }] },

@@ -7,7 +7,7 @@ from synthetic_study import failing, synthetic
 
 from qpmpc.codegen.board.report import board_answer
 from qpmpc.codegen.pil.page import pil_answer
-from qpmpc.report.charts import Panel, Series, numbers, over_time
+from qpmpc.report.charts import Panel, Series, numbers, over_time, run_chart
 from qpmpc.report.study.answer import study_answer
 from qpmpc.report.study.summary import study_summary
 from qpmpc.verification.benchmark.pareto import Point
@@ -135,6 +135,22 @@ def test_a_study_names_the_runs_studied_then_what_went_wrong():
     )
     whole = failing(frame, range(len(frame)), "broken")
     assert "every run failed" in study_answer(study_summary(whole, study))[-1]
+
+
+def test_faults_are_drawn_where_they_were_injected(runs):
+    assert len(run_chart(runs)["panels"][0]["series"]) == 1
+    faulted = replace(runs[1], faults={"each": [{"at_s": 10, "for_s": 5}]})
+    _, fault = run_chart([runs[0], faulted])["panels"][0]["series"]
+    assert [k for k, value in enumerate(fault["values"]) if value] == [10, 11, 12, 13, 14]
+
+
+def test_powers_of_all_runs_have_one_scale(runs):
+    first, second = run_chart(runs)["panels"][1:3]
+    assert first["span"] == second["span"]
+    for panel in (first, second):
+        for line in panel["series"]:
+            assert first["span"][0] <= min(line["values"])
+            assert max(line["values"]) <= first["span"][1]
 
 
 def test_what_a_chart_holds_can_be_put_into_a_page():
