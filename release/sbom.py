@@ -1,8 +1,9 @@
 """List what is shipped and what it needs, with licences, as CycloneDX 1.6 (JSON).
 
 ``make sbom`` writes build/sbom.cdx.json. Packages, versions and licences are what the metadata of
-this environment says, required ones apart from those of extras; `dev` is left out. The cycles' data
-and OSQP, whose sources ``qpmpc codegen --algorithm osqp`` copies into projects, are components too.
+this environment says, required ones apart from those of extras; `dev` is left out. The cycles'
+data, uPlot in the reports, and OSQP, whose sources ``qpmpc codegen --algorithm osqp`` copies into
+projects, are components too.
 The same environment gives the same file: it has no date and no random number.
 """
 
@@ -10,6 +11,7 @@ import json
 import re
 import sys
 from importlib import metadata
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -132,13 +134,30 @@ def data() -> list[dict[str, Any]]:
     ]
 
 
+def chart_library() -> dict[str, Any]:
+    """Return the component of uPlot, which is in the package itself and in every report."""
+    program = files("qpmpc.report").joinpath("web", "uPlot.iife.min.js").read_text("utf-8")
+    found = re.search(r"uPlot \(v([\d.]+)\)", program)
+    assert found, "uPlot's first line names its version"
+    url = f"pkg:npm/uplot@{found[1]}"
+    return {
+        "type": "library",
+        "bom-ref": url,
+        "name": "uplot",
+        "version": found[1],
+        "purl": url,
+        "licenses": [{"license": {"name": "MIT"}}],
+        "scope": "required",
+    }
+
+
 def bill() -> dict[str, Any]:
     """Return the whole bill of materials."""
     offered = metadata.metadata(PRODUCT).get_all("Provides-Extra") or []
     extras = tuple(sorted(extra for extra in offered if extra not in LEFT_OUT))
     graph = closure(extras)
     required = closure(()).keys()
-    cycles = data()
+    shipped = [*data(), chart_library()]
     others = sorted(graph.keys() - {PRODUCT})
     return {
         "bomFormat": "CycloneDX",
@@ -154,12 +173,12 @@ def bill() -> dict[str, Any]:
                 "licenses": licences(PRODUCT),
             }
         },
-        "components": [*(package(name, name in required) for name in others), *cycles],
+        "components": [*(package(name, name in required) for name in others), *shipped],
         "dependencies": [
             {
                 "ref": reference(name),
                 "dependsOn": sorted(map(reference, needs))
-                + ([each["bom-ref"] for each in cycles] if name == PRODUCT else []),
+                + ([each["bom-ref"] for each in shipped] if name == PRODUCT else []),
             }
             for name, needs in sorted(graph.items())
         ],

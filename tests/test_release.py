@@ -89,6 +89,7 @@ def test_the_bill_lists_what_is_needed_with_licences():
     assert not {"pytest", "mypy", "qpmpc-iptm"} & components.keys()
     assert "codegen --algorithm osqp" in json.dumps(components["osqp"])
     assert "Apache" in json.dumps(components["osqp"]["licenses"])
+    assert components["uplot"]["licenses"] == [{"license": {"name": "MIT"}}]
     for name in cycle_names():
         assert components[f"cycle {name}"]["licenses"]
     for each in components.values():
