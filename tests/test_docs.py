@@ -15,7 +15,7 @@ from qpmpc.cli.app import app
 from qpmpc.vehicle import load_vehicle
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 FENCED = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 RESULTS = re.compile(r"^\| ([\w-]+) \| ([\w-]+)" + 4 * r" \| ([\d.-]+)" + r" \| (\d+) \|$", re.M)
 
@@ -154,6 +154,14 @@ def test_links_and_pictures_exist(page):
     for target in re.findall(r"\]\(([^)]+)\)", page.read_text("utf-8")):
         if "://" not in target:
             assert (page.parent / target.partition("#")[0]).exists(), target
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_files_of_the_code_that_are_named_exist(page):
+    file = r"`((?:qpmpc|codegen|cycles|verification|tests)/[\w./-]+)`"
+    named = re.findall(file, page.read_text("utf-8"))
+    for path in named:
+        assert (ROOT / path).exists(), path
 
 
 def test_pictures_are_small():

@@ -13,7 +13,7 @@ import qpmpc
 from qpmpc.cli import main
 
 PAGE = (Path(__file__).resolve().parents[1] / "docs" / "your_car.md").read_text("utf-8")
-STEPS = re.findall(r"^```console\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+STEPS = re.findall(r"^```bash\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
 HERE_FILE = re.compile(r"cat > (\S+) <<END\n(.*?)^END\n", re.MULTILINE | re.DOTALL)
 SPEEDS_RPM = range(1000, 5300, 250)
 NO_VALUE = 40  # row of the log, and point of the map, that has none
