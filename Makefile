@@ -4,7 +4,7 @@
 # make release-check  wheel and sdist, built and tried in clean environments of every Python here
 # make sbom   licences of what is shipped and needed, in build/sbom.cdx.json
 # make history        the benchmark history, extended by this commit
-# make docs   API reference from the docstrings, in build/api
+# make docs   the documentation as a site, in build/site
 # make clean  remove everything these made
 # All but release-check first make the virtual environment .venv; a second time that is skipped.
 
@@ -39,7 +39,7 @@ types: $(STAMP)
 	cd $(TYPED) && ../../$(BIN)/mypy --config-file ../../pyproject.toml --cache-dir ../../.mypy_cache -p qpmpc
 
 docs: $(STAMP)
-	$(BIN)/python docs/make_api.py build/api
+	$(BIN)/python website/build.py build/site
 
 release-check:
 	$(PYTHON) release/check.py
