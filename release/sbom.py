@@ -1,9 +1,9 @@
 """List what is shipped and what it needs, with licences, as CycloneDX 1.6 (JSON).
 
 ``make sbom`` writes build/sbom.cdx.json. Packages, versions and licences are what the metadata of
-this environment says, required ones apart from those of extras; `dev` is left out. The cycles'
-data, uPlot in the reports, and OSQP, whose sources ``qpmpc codegen --algorithm osqp`` copies into
-projects, are components too.
+this environment says, required ones apart from those of extras; `dev` and `docs` are left out. The
+cycles' data, uPlot in the reports, and OSQP, whose sources ``qpmpc codegen --algorithm osqp``
+copies into projects, are components too.
 The same environment gives the same file: it has no date and no random number.
 """
 
@@ -20,7 +20,7 @@ from packaging.requirements import Requirement
 from qpmpc.cycles.catalogue import catalogue
 
 PRODUCT = "qpmpc-iptm"
-LEFT_OUT = ("all", "dev")
+LEFT_OUT = ("all", "dev", "docs")
 LONGEST = 80  # characters of a licence's name; some packages give its whole text
 
 

@@ -12,7 +12,7 @@ from qpmpc.cli.health.piece import Piece, State
 
 DISTRIBUTION = "qpmpc-iptm"
 LIMIT_S = 120.0  # for all imports: a cold disk, not a slow package
-SUMS = ("all", "dev")  # extras that bring no feature: `dev` is for work on qpmpc itself
+SUMS = ("all", "dev", "docs")  # extras that bring no feature: for work on qpmpc itself
 DISABLES = {
     "core": "everything",
     "plot": "pictures and HTML reports",
