@@ -24,7 +24,7 @@ from qpmpc.registry import (
     is_of_vehicle,
     make_controller,
 )
-from qpmpc.report.columns import COMPARE_COLUMNS, notes
+from qpmpc.report.columns import compare_columns, notes
 from qpmpc.report.table import print_rows
 from qpmpc.report.write import comparison_html, write_comparison
 from qpmpc.results import OPTIMUM, Run, compare_runs
@@ -103,9 +103,9 @@ class Runs(Sequence[Run]):
     def __str__(self) -> str:
         if not self._runs:
             return "no runs"
-        text = StringIO()
+        text, rows = StringIO(), self.rows()
         console = Console(file=text, width=PRINTED_WIDTH, highlight=False)
-        print_rows(console, self.rows(), COMPARE_COLUMNS, "cycle")
+        print_rows(console, rows, compare_columns(rows), "cycle")
         return "\n".join([text.getvalue().rstrip(), *map(shown, self.remarks())])
 
 
@@ -116,6 +116,7 @@ def compare(
     *,
     settings: SettingsLike | None = None,
     plant: str | None = None,
+    figures: Mapping[str, Callable[[Run], float]] | None = None,
     next_job: Callable[[str], Progress] | None = None,
 ) -> Runs:
     """Drive every cycle with every controller, one after the other.
@@ -127,6 +128,8 @@ def compare(
     plant : somebody else's that is driven in place of ours, by name: ``"fastsim"``. Controllers
         then believe in a vehicle that is derived from it, with the engine of `vehicle` if one is
         given; that name is also that of its own control
+    figures : your own, by name with unit: functions of a run, for every controller's; they are
+        columns of table and report, and in the JSON
     next_job : called with the title of each run; returns the function that takes its progress
 
     Raises
@@ -170,6 +173,8 @@ def compare(
                     of_car.append(f"{OPTIMUM} is the optimum of {trip.vehicle.name}, replayed on "
                                   f"the plant {car.name}: no bound there")  # fmt: skip
                 run = replace(run, remarks=(*of_car, *run.remarks))
+            if figures:
+                run = replace(run, figures={what: float(f(run)) for what, f in figures.items()})
             runs.append(run)
     return Runs(runs, chosen)
 

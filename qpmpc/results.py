@@ -1,6 +1,6 @@
 """Results of a run: the figures computed from its trajectory, JSON."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -43,6 +43,7 @@ class Run:
     reservations : why its controller says that its fuel cannot be compared
     expects : what its controller expected at departure
     soc_price_g : fuel that a unit of final SOC is worth, from a controller that knows: `dp`
+    figures : a user's own, by name with unit, see `compare`
     """
 
     cycle: str
@@ -58,6 +59,7 @@ class Run:
     reservations: tuple[str, ...] = ()
     expects: Expectation | None = None
     soc_price_g: float | None = None
+    figures: Mapping[str, float] = field(default_factory=dict)
 
     def __str__(self) -> str:
         said = [f"{self.fuel_soc_balanced_g:.1f} g of fuel, SOC-balanced", *self.remarks]
@@ -235,6 +237,7 @@ class Run:
             "soc_price_g": self.soc_price_g,
             **({} if self.faults is None else {"faults": self.faults}),
             **({} if self.plant is None else {"plant": self.plant}),
+            **({"figures": dict(self.figures)} if self.figures else {}),
         }
 
 

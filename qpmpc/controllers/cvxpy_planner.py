@@ -3,11 +3,15 @@
 from typing import Any
 
 import cvxpy
+import numpy as np
+from numpy.typing import NDArray
 
+from qpmpc.controllers.cvxpy_terms import checked_terms
 from qpmpc.controllers.ramp import RampFloor
 from qpmpc.controllers.receding_horizon import Plan, Planner
 from qpmpc.controllers.settings import SettingsLike
 from qpmpc.errors import InputError, QpmpcError
+from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.cvxpy_twin import CvxpyTwin
 from qpmpc.qp.linearisation import Linearisation
@@ -21,7 +25,8 @@ class CvxpyPlanner(Planner):
     """Plans with the QP of `mh-qp` as a cvxpy program, solved to convergence each second.
 
     A subclass adds to the program in `terms`. The program must keep to cvxpy's rules for
-    parametrised programs (DPP), or it is compiled anew each second.
+    parametrised programs (DPP): it is compiled once, and only its parameters change from second
+    to second.
 
     Parameters
     ----------
@@ -50,12 +55,9 @@ class CvxpyPlanner(Planner):
         self.preview = trip.preview(of_qp.horizon)
         model = PwaModel.of(vehicle, of_qp.pwa)
         self.program = CvxpyTwin(vehicle, model, self.preview.count, of_qp.qp)
-        added = self.terms(self.program)
-        if not (isinstance(added, tuple) and len(added) == 2):
-            raise QpmpcError(f"{self.name}: terms returned {added!r}, not (cost, [constraints])")
-        self.program.add(*added)
-        if not self.program.problem.is_dcp():
-            raise QpmpcError(f"{self.name}: what terms adds is not convex by cvxpy's rules")
+        self._own = checked_terms(self.name, self.program, self.terms)
+        self.program.add(*self._own)
+        self._explained = False
         self._about: Linearisation | None = None
         self._ramp = RampFloor(vehicle)
 
@@ -68,6 +70,36 @@ class CvxpyPlanner(Planner):
         """
         return 0.0, []
 
+    def set_program(self, seen: Observation) -> Stages:
+        """Set the program's own parameters for a second; returns its stages."""
+        about = self._about or Linearisation.constant(self.preview.count, seen.t_cl_degc)
+        stages = self.preview.at(seen.step)
+        self.program.update(stages, seen.soc, seen.t_cl_degc, about, seen.engine_on)
+        return stages
+
+    def solved(self) -> NDArray[np.float64]:
+        """Solve the program as it is set; x as of `CvxpyTwin.solve`."""
+        return self.program.solve(self.solver)
+
+    def _require_values(self) -> None:
+        for parameter in self.program.problem.parameters():
+            if parameter.value is None:
+                raise QpmpcError(
+                    f"{self.name}: the parameter {parameter.name()!r} of terms has no value: set "
+                    "it in plan, before super().plan(seen)"
+                )
+
+    def _why(self) -> str:
+        """Whether the terms leave no solution, said once in a run."""
+        if self._explained or self.solver_fails or not self._own[1]:
+            return ""
+        self._explained = True
+        return (
+            ": without the constraints of terms there is a plan"
+            if self.program.is_solvable_without(self._own[1], self.solver)
+            else ""
+        )
+
     def depart(self, seen: Observation) -> None:
         """Forget any earlier trip."""
         self.forget()
@@ -75,20 +107,19 @@ class CvxpyPlanner(Planner):
     def forget(self) -> None:
         """Forget preview and last plan, as after a restart of the ECU under way."""
         self.preview.forget()
-        self._about = None
+        self._about, self._explained = None, False
 
     def plan(self, seen: Observation) -> Plan:
         """Solve the program of this second; without a solution there is no plan."""
-        about = self._about or Linearisation.constant(self.preview.count, seen.t_cl_degc)
-        stages = self.preview.at(seen.step)
-        self.program.update(stages, seen.soc, seen.t_cl_degc, about, seen.engine_on)
+        stages = self.set_program(seen)
+        self._require_values()
         try:
-            x = self.program.solve(self.solver)
+            x = self.solved()
             if self.solver_fails:
                 raise QpmpcError("failure injected")
         except QpmpcError as error:
             self._about = None
-            return Plan.none(str(error))
+            return Plan.none(f"{error}{self._why()}")
         # short stages move up by one second until the next time
         layout = self.preview.settings
         self._about = Linearisation.about(x[self.preview.shift()], seen.t_cl_degc, layout)

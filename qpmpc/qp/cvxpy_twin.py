@@ -3,16 +3,17 @@
 import ast
 from collections.abc import Sequence
 from types import CodeType
-from typing import Any
+from typing import Any, NamedTuple
 
 import cvxpy
 import numpy as np
 from numpy.typing import NDArray
 
-from qpmpc.errors import QpmpcError
+from qpmpc.errors import InputError, QpmpcError
+from qpmpc.names import unknown
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
-from qpmpc.qp.expressions import code_of
+from qpmpc.qp.expressions import code_of, expression
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.quantities import Quantities
 from qpmpc.qp.rows import Entry, Row, Var, table_of
@@ -38,6 +39,23 @@ UNIT = {
 }
 
 
+METHODS = ("given", "state")  # that a user calls in `terms`
+
+
+class State(NamedTuple):
+    """A state that a user added.
+
+    Attributes
+    ----------
+    end, before : at the end of each stage and of the one before it, shape (n,)
+    now : parameter with its value now, to be set each second
+    """
+
+    end: Any
+    before: Any
+    now: Any
+
+
 class CvxpyTwin:
     """The multi-horizon QP as a disciplined parametrised program: compiled once, then updated.
 
@@ -52,16 +70,24 @@ class CvxpyTwin:
     vehicle, model : plant parameters and the PWA curves made from them
     stages : number of stages n
     settings : weights and margins
+    regularised : with the regularisation of `StageQp`, for comparisons with it
 
     Attributes
     ----------
-    soc, t_cl_degc, p_eng_w, on, fuel_g_per_s, internal_w, t_slack_k : expressions, shape (n,)
+    soc, t_cl_degc, p_eng_w, on, fuel_g_per_s, internal_w, t_slack_k, starts : expressions, shape
+        (n,): SOC and coolant at the end of each stage, the others means over it, starts in it. A
+        vehicle whose engine starts at no cost has no `starts`
     rows : constraints by the name of their row
     objective, constraints, problem : the program
     """
 
     def __init__(
-        self, vehicle: Vehicle, model: PwaModel, stages: int, settings: QpSettings | None = None
+        self,
+        vehicle: Vehicle,
+        model: PwaModel,
+        stages: int,
+        settings: QpSettings | None = None,
+        regularised: bool = False,
     ) -> None:
         self.vehicle, self.model, self.stages = vehicle, model, stages
         self.settings = settings or QpSettings()
@@ -76,16 +102,20 @@ class CvxpyTwin:
         self.p_eng_w, self.on = x[Var.P_ENG], x[Var.ON]
         self.fuel_g_per_s, self.internal_w = x[Var.FUEL], x[Var.INTERNAL]
         self.t_slack_k = x[Var.T_SLACK]
+        if self.table.has_start:
+            self.starts = x[Var.START]
         # the state now is a variable with one value, as products of parameters are not DPP
         start = {var: cp.Variable(1, name=f"{names[var]}_now") for var in self.table.coupling}
         self._now = {var: cp.Parameter(name=f"{names[var]}_given") for var in start}
         self._x: dict[Entry, Any] = {Entry(var, False): x[var] for var in x}
         for state, known in start.items():
             self._x[Entry(state, True)] = cp.hstack([UNIT[state] * known, x[state][:-1]])
+        self._given: dict[str, Any] = {}
         self.rows = {row.name: self._constraints(row) for row in self.table.rows}
         self.constraints = [self._x[Entry(s, True)][0] == now for s, now in self._now.items()]
         self.constraints += [part for parts in self.rows.values() for part in parts]
-        self._smoothing = {var: cp.Parameter(stages, nonneg=True) for var in x}
+        of = x if regularised else ()
+        self._smoothing = {var: cp.Parameter(stages, nonneg=True) for var in of}
         self.objective = cp.Minimize(self._cost())
         self.problem = cp.Problem(self.objective, self.constraints)
 
@@ -95,11 +125,51 @@ class CvxpyTwin:
         self.constraints = [*self.constraints, *constraints]
         self.problem = cp.Problem(self.objective, self.constraints)
 
-    def _value(self, formula: ast.expr, piece: int = 0) -> Any:
+    def given(self, name: str) -> Any:
+        """Return what the program knows of each stage, shape (n,), by a name of its table.
+
+        Such as `duration_s`, `net_w`, `speed_mps`: fields of `Stages`, `QUANTITIES` of
+        `qpmpc.qp.rows`, numbers of `qp_parameters`. What changes is a parameter, set each second.
+
+        Raises
+        ------
+        InputError
+            If the table has no such name.
+        """
+        if name not in self._given:
+            known = self._quantities.of_stages()
+            if name not in known:
+                raise InputError(unknown("quantity of a stage", name, tuple(sorted(known))))
+            self._given[name] = self._value(expression(name), name=name)
+        return self._given[name]
+
+    def state(self, name: str) -> State:
+        """Add a state of your own: a variable of each stage, and its value now as a parameter.
+
+        Parameters
+        ----------
+        name : of the variables, letters, digits and underscores
+        """
+        if not name.isidentifier():
+            raise InputError(f"a state's name has letters, digits and underscores, not {name!r}")
+        end, first = cp.Variable(self.stages, name=name), cp.Variable(1, name=f"{name}_now")
+        now = cp.Parameter(name=f"{name}_given")
+        self.constraints = [*self.constraints, first[0] == now]
+        return State(end, cp.hstack([first, end[:-1]]), now)
+
+    def __getattr__(self, name: str) -> Any:
+        """Say what there is instead of a name that is wrong."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        known = [each for each in vars(self) if not each.startswith("_")]
+        raise AttributeError(unknown("name of the program", name, (*known, *METHODS)))
+
+    def _value(self, formula: ast.expr, piece: int = 0, name: str = "") -> Any:
         """A formula of the table, for one piece of its row: a parameter where steps change it."""
         code = code_of(formula)
         if self._quantities.is_changing(formula):
-            parameter = cp.Parameter(self.stages)
+            # its name is also that of a function in generated C
+            parameter = cp.Parameter(self.stages, name=name or f"given_{len(self._parameters)}")
             self._parameters.append((parameter, code, piece))
             return parameter
         return self._of_piece(code, piece)
@@ -164,13 +234,15 @@ class CvxpyTwin:
         self._smooth(scaling)
 
     def _smooth(self, scaling: Scaling | None) -> None:
+        if scaling is not None and not self._smoothing:
+            raise QpmpcError("cvxpy twin: a scaling has no effect without regularised=True")
         weights = np.zeros((self.stages, len(self.table.variables)))
         if scaling is not None:
             # 1/2 r z^2 of cost c x grams, with z = x / column
             size = self.settings.regularisation / scaling.cost
             weights = np.sqrt(size) / scaling.column.reshape(weights.shape)
             weights[:, self.table.states] = 0.0
-        for var in self.table.variables:
+        for var in self._smoothing:
             self._smoothing[var].value = weights[:, var] * UNIT[var]
 
     def solve(self, solver: str = "CLARABEL", **options: Any) -> Floats:
@@ -196,6 +268,20 @@ class CvxpyTwin:
             raise QpmpcError(f"cvxpy twin: {solver}: {reason}") from error
         if self.problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
             raise QpmpcError(f"cvxpy twin: {solver} ends with {self.problem.status!r}")
+        return self.plan()
+
+    def is_solvable_without(self, constraints: Sequence[Any], solver: str) -> bool:
+        """Whether the program of the last update has an optimum without some constraints."""
+        left = [each for each in self.constraints if not any(each is one for one in constraints)]
+        problem = cp.Problem(self.objective, left)
+        try:
+            problem.solve(solver=solver)
+        except cp.SolverError:
+            return False
+        return problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)
+
+    def plan(self) -> Floats:
+        """Return x as solved, see `solve`."""
         return np.column_stack(
             [np.asarray(self._x[Entry(var, False)].value) for var in self.table.variables]
         )

@@ -113,6 +113,11 @@ class Quantities:
                 exec(code_of([line]), self._names)
         self._each_step = code_of(each_step)
 
+    def of_stages(self) -> set[str]:
+        """Return the names of numbers, and of what has one value per stage."""
+        numbers = {name for name, value in self._names.items() if isinstance(value, float)}
+        return (numbers | self._changing) - set(LEARNED)
+
     def is_changing(self, formula: ast.AST) -> bool:
         """Whether a formula's value changes from step to step."""
         return not self._changing.isdisjoint(names_in(formula))

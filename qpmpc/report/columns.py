@@ -107,6 +107,20 @@ SIMULATE_COLUMNS = (*NAMES, *FUEL, *STATE, *OPERATION)
 COMPARE_COLUMNS = (*NAMES, *FUEL, *AGAINST, *STATE, *OPERATION)
 
 
+def compare_columns(rows: Sequence[Row]) -> tuple[Column, ...]:
+    """Return the columns of a comparison, with those of the users' own figures."""
+    own = dict.fromkeys(name for row in rows for name in row.get("figures", {}))
+    return (*NAMES, *FUEL, *AGAINST, *map(_of_figure, own), *STATE, *OPERATION)
+
+
+def _of_figure(name: str) -> Column:
+    def text(row: Row) -> str:
+        value = row.get("figures", {}).get(name)
+        return NONE if value is None else f"{value:.4g}"
+
+    return Column(name.replace("_", " "), text)
+
+
 def filled(columns: Sequence[Column], rows: Sequence[Row]) -> list[Column]:
     """Return the columns that have a figure in any of the rows."""
     return [column for column in columns if any(column.text(row) != NONE for row in rows)]

@@ -9,7 +9,7 @@ import numpy as np
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.report.answer import comparison_answer
 from qpmpc.report.charts import run_chart
-from qpmpc.report.columns import COMPARE_COLUMNS, Row, filled, notes
+from qpmpc.report.columns import Row, compare_columns, filled, notes
 from qpmpc.report.html import html_page, preformatted
 from qpmpc.report.parameter_rows import parameter_rows
 from qpmpc.report.provenance import provenance
@@ -32,7 +32,7 @@ def compare_html(
     pictures : PNG of each cycle
     """
     vehicle = runs[0].vehicle
-    columns = filled(COMPARE_COLUMNS, rows)
+    columns = filled(compare_columns(rows), rows)
     # the rules are also the last resort of other controllers
     names = {"rule_based", *(run.controller.replace("-", "_") for run in runs)}
     if "mh_nlp" in names:

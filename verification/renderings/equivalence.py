@@ -104,7 +104,7 @@ class Renderings:
         self.preview = trip.preview(chosen.horizon)
         stages = self.preview.count
         self.qp = StageQp(vehicle, model, stages, chosen.qp, chosen.scaling)
-        self.twin = CvxpyTwin(vehicle, model, stages, chosen.qp)
+        self.twin = CvxpyTwin(vehicle, model, stages, chosen.qp, regularised=True)
         self.generated: GeneratedQp | None = None
         if compiler() is not None:
             blocks = chosen.horizon.block_count(trip.forecast.steps)
