@@ -10,6 +10,8 @@ import pytest
 
 FOLDER = Path(__file__).parents[1] / "examples"
 SCRIPTS = sorted(file.name for file in FOLDER.glob("*.py"))
+# run where their figures are tested
+ELSEWHERE = ("engine_starts.py", "nox.py", "battery_temperature.py")
 
 
 @pytest.fixture(scope="module")
@@ -19,9 +21,9 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", SCRIPTS)
+@pytest.mark.parametrize("name", [name for name in SCRIPTS if name not in ELSEWHERE])
 def test_example(name: str, tmp_path: Path, cache: str) -> None:
-    if name == "embedded.py" and not all(map(shutil.which, ("make", "cc"))):
+    if name in ("embedded.py", "prototype_cost.py") and not all(map(shutil.which, ("make", "cc"))):
         pytest.skip("not installed: make, cc")
     done = subprocess.run(
         [sys.executable, "-W", "error", FOLDER / name],

@@ -72,8 +72,8 @@ def _checked_cost(name: str, cost: Any) -> Any:
         raise QpmpcError(f"{name}: terms: the cost is {_short(cost)}, not an expression") from error
     if grams.size != 1:
         raise QpmpcError(
-            f"{name}: terms: the cost has shape {grams.shape}, and must be one number in grams: sum "
-            "it over the stages with cp.sum"
+            f"{name}: terms: the cost has shape {grams.shape}, and must be one number in grams: "
+            "sum it over the stages with cp.sum"
         )
     if not grams.is_convex():
         raise QpmpcError(
