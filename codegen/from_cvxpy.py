@@ -302,6 +302,7 @@ def in_c(planner: type[CvxpyPlanner]) -> type[CvxpyPlanner]:
 
         def solved(self) -> NDArray[np.float64]:
             """Solve in C."""
-            return self._compiled.solve()  # type: ignore[no-any-return]
+            found: NDArray[np.float64] = self._compiled.solve()
+            return found
 
     return InC
