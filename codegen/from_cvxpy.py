@@ -282,7 +282,8 @@ class CompiledProgram:
         )
         if status not in SOLVED:
             raise CodegenError(f"generated program: {SOLVER} ends with status {status}")
-        return self._plan.T * self._unit
+        x: NDArray[np.float64] = self._plan.T * self._unit
+        return x
 
 
 def in_c(planner: type[CvxpyPlanner]) -> type[CvxpyPlanner]:
