@@ -113,6 +113,12 @@ clean:
 """
 
 
+NOTICE = """src and include were written by cvxpygen (Apache-2.0) from a program of qpmpc (Apache-2.0).
+solver_code is QOCO (BSD-3-Clause) with QDLDL (Apache-2.0) and AMD (BSD-3-Clause), as cvxpygen has
+them, changed as said here: qoco_config.h, qdldl_types.h and qdldl_version.h are the product's own.
+"""
+
+
 def program_files(planner: CvxpyPlanner) -> dict[str, str]:
     """Generate the C of a planner's program.
 
@@ -199,6 +205,7 @@ def _own_files(planner: CvxpyPlanner, others: dict[str, str]) -> dict[str, str]:
         "program.h": header,
         "program.c": source,
         "Makefile": makefile,
+        "NOTICE": NOTICE,
         **CONFIGURED,
     }
 
@@ -289,7 +296,8 @@ class CompiledProgram:
 def in_c(planner: type[CvxpyPlanner]) -> type[CvxpyPlanner]:
     """Return a planner as this one, named ``NAME-c``, whose program is solved by generated C.
 
-    Generating and compiling takes some seconds when one is made.
+    Generating and compiling takes some seconds when one is made. The C has its own solver: the
+    class attribute `solver` has no effect on it.
     """
 
     class InC(planner):  # type: ignore[valid-type, misc]

@@ -20,6 +20,7 @@ DISABLES = {
     "sweep": "studies of many runs: sweep, report",
     "logs": "trips from GPX and MDF files",
     "fastsim": "FASTSim's car as the plant",
+    "prototype": "C for own terms in cvxpy",
     "fmu": "checks of an FMU by FMPy; the export itself needs none",
 }
 # Imports one after the other and says so; a package may print, or end the process
