@@ -11,7 +11,7 @@ import numpy as np
 import qpmpc
 from qpmpc.codegen.from_cvxpy import in_c
 
-SECONDS = int(sys.argv[1]) if len(sys.argv) > 1 else 60
+SECONDS = int(sys.argv[1]) if len(sys.argv) > 1 else 40
 
 
 class Gentle(qpmpc.CvxpyPlanner):
