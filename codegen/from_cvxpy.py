@@ -113,7 +113,7 @@ clean:
 """
 
 
-NOTICE = """src and include were written by cvxpygen (Apache-2.0) from a program of qpmpc (Apache-2.0);
+NOTICE = """src and include were written by cvxpygen (Apache-2.0) from a program of qpmpc (same);
 allocations in cpg_solve.c are changed. solver_code is QOCO (BSD-3-Clause) with QDLDL (Apache-2.0)
 and AMD (BSD-3-Clause), as cvxpygen has them; qoco_config.h, qdldl_types.h and qdldl_version.h are
 the product's own.
