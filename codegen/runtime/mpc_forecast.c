@@ -85,41 +85,47 @@ static void sum_up(mpc_forecast *forecast)
     forecast->next = 0;
 }
 
-/* Internal battery power with the engine off; 0 in hard driving, in which the engine runs. */
-static mpc_real drained_w(mpc_real demand_w, int32_t is_hard)
+/* Internal battery power with the engine off. */
+static mpc_real drained_w(mpc_real demand_w)
 {
-    return (is_hard != 0) ? REAL(0.0) : mpc_map_planned_internal_w(battery_side_w(demand_w));
+    return mpc_map_planned_internal_w(battery_side_w(demand_w));
 }
 
-/* How far the battery's energy falls below and rises above where a block begins and ends, if the
- * engine makes up evenly in hard driving for all the rest; everywhere in a block without any. */
+/* How far the battery's energy falls below where a block begins and rises above where it ends, if
+ * the engine makes up evenly in hard driving for all the rest; everywhere in a block without any.
+ * An engine at rest is the least: a descent ends above. */
 static mpc_swing swing_of(const mpc_forecast *forecast, int32_t first)
 {
     const int32_t end = ((first + forecast->block_s) < forecast->covered)
                             ? (first + forecast->block_s)
                             : forecast->covered;
     mpc_sum drained = {REAL(0.0), REAL(0.0)};
+    mpc_sum drained_hard = {REAL(0.0), REAL(0.0)};
     int32_t hard = 0;
     for (int32_t second = first; second < end; second++) {
         const mpc_real demand_w = forecast->trip.demand_w[second];
         const int32_t is_hard = (class_of(demand_w) == 0) ? 1 : 0;
-        add_to(&drained, drained_w(demand_w, is_hard));
+        add_to((is_hard != 0) ? &drained_hard : &drained, drained_w(demand_w));
         hard += is_hard;
     }
     const int32_t seconds = end - first;
     const int32_t all = (seconds > 0) ? seconds : 1;
-    const mpc_real repaid_w = mean_of(&drained, (mpc_real)((hard > 0) ? hard : all));
+    const mpc_real balanced_w = mean_of(&drained, (mpc_real)((hard > 0) ? hard : all));
+    const mpc_real resting_w = -mean_of(&drained_hard, (mpc_real)((hard > 0) ? hard : 1));
+    const mpc_real repaid_w = real_max(balanced_w, resting_w);
     mpc_swing swing = {REAL(0.0), REAL(0.0)};
     mpc_sum level = {REAL(0.0), REAL(0.0)};
     for (int32_t second = first; second < end; second++) {
         const mpc_real demand_w = forecast->trip.demand_w[second];
         const int32_t is_hard = (class_of(demand_w) == 0) ? 1 : 0;
-        add_to(&level, -drained_w(demand_w, is_hard));
+        add_to(&level, (is_hard != 0) ? REAL(0.0) : -drained_w(demand_w));
         add_to(&level, ((is_hard != 0) || (hard == 0)) ? repaid_w : REAL(0.0));
         const mpc_real now = level.sum + level.lost;
         swing.fall_j = real_max(swing.fall_j, -now);
         swing.rise_j = real_max(swing.rise_j, now);
     }
+    const mpc_real above_start_j = real_max(level.sum + level.lost, REAL(0.0));
+    swing.rise_j = real_max(swing.rise_j - above_start_j, REAL(0.0));
     return swing;
 }
 

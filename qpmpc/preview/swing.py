@@ -40,12 +40,14 @@ def swings(
     With l the internal power with the engine off, from the start of a block to each t in it,
 
         path(t) = sum of -l outside hard driving, and of a constant in hard driving (everywhere,
-                  where there is none) with which the path ends where it began
+                  where there is none) with which the path ends where it began; but no engine
+                  takes, so it is at least that of an engine at rest, and a descent ends above
 
     is what an engine leads to that runs in hard driving. It can be run so that the battery swings
     less: of block b and the next, which begins there, a share s is kept,
 
-        fall_b = s max(-min path_b, -min path_b+1),   rise_b = s max(max path_b, max path_b+1)
+        fall_b = s max(fall of path_b, fall of path_b+1),   fall of path = -min path
+        rise_b = s max(rise of path_b, rise of path_b+1),   rise of path = max path - max(end, 0)
 
     each at least `LEAST_KEPT_J` and at most half of the room between the limits. One class has no
     swing: an averaged preview knows nothing of it.
@@ -113,5 +115,6 @@ def _swing(flow_w: Floats, is_hard: NDArray[np.bool_]) -> tuple[float, float]:
         return 0.0, 0.0
     repaid = is_hard if is_hard.any() else np.ones_like(is_hard)
     kept_w = np.where(is_hard, 0.0, flow_w)
-    path = np.cumsum(kept_w - kept_w.sum() / repaid.sum() * repaid)
-    return max(-path.min(), 0.0), max(path.max(), 0.0)
+    least_w = float(flow_w[is_hard].mean()) if is_hard.any() else 0.0
+    path = np.cumsum(kept_w + max(-kept_w.sum() / repaid.sum(), least_w) * repaid)
+    return max(-path.min(), 0.0), max(path.max() - max(path[-1], 0.0), 0.0)

@@ -68,12 +68,28 @@ def test_the_end_of_a_block_keeps_what_the_next_needs_too() -> None:
     )
 
 
+def test_no_engine_takes_from_the_battery_so_a_descent_ends_above() -> None:
+    """It falls no deeper than with the engine at rest, and its own energy is no swing."""
+    fall, rise = of_blocks([EASY_W, BRAKING_W, BRAKING_W, BRAKING_W])
+    assert fall[0] == pytest.approx(EASY_J)
+    assert rise[0] == LEAST_KEPT_J
+    modest_w = 10e3  # hard, and within the battery's power
+    hard_j = stored_j(modest_w)
+    assert hard_j + 2.0 * EASY_J < 9.0 * BRAKED_J
+    fall, rise = of_blocks([EASY_W, EASY_W, modest_w] + 9 * [BRAKING_W])
+    assert fall[0] == pytest.approx(2.0 * EASY_J + hard_j)
+    assert rise[0] == LEAST_KEPT_J
+    fall, rise = of_blocks(9 * [BRAKING_W] + [modest_w, EASY_W])
+    assert fall[0] == LEAST_KEPT_J
+    assert rise[0] == pytest.approx(hard_j + EASY_J)  # above its end
+
+
 def test_a_share_is_kept_and_at_most_half_of_the_room() -> None:
     one = of_blocks([EASY_W, HARD_W], swing_share=0.3)
     np.testing.assert_allclose(one, [[0.3 * EASY_J], [LEAST_KEPT_J]])
     many = int(ROOM_J / min(EASY_J, BRAKED_J)) + 1
     fall, _ = of_blocks([EASY_W] * many + [HARD_W])
-    _, rise = of_blocks([BRAKING_W] * many + [HARD_W])
+    _, rise = of_blocks([BRAKING_W] * many + [HARD_W] * many)
     assert fall[0] == pytest.approx(0.5 * ROOM_J)
     assert rise[0] == pytest.approx(0.5 * ROOM_J)
 
