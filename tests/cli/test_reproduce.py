@@ -44,10 +44,10 @@ def test_without_the_plot_extra_it_says_what_to_install(cli, tmp_path):
 
 @pytest.mark.slow
 def test_the_other_car_on_a_mild_day(cli, tmp_path, monkeypatch, strict_json):
-    """The first minute is enough for the way in and out; `verification` has the quick run."""
+    """The first seconds are enough for the way in and out; `verification` has the quick run."""
     quick = Extent.quick()
     minutes = tuple(
-        Cycle(cycle.name, cycle.time_s[:61], cycle.speed_mps[:61], cycle.grade[:61])
+        Cycle(cycle.name, cycle.time_s[:37], cycle.speed_mps[:37], cycle.grade[:37])
         for cycle in quick.cycles
     )
     monkeypatch.setattr(Extent, "quick", lambda: replace(quick, cycles=minutes))
