@@ -7,7 +7,11 @@ from pages import assert_self_contained
 
 import qpmpc.registry
 from qpmpc.verification.checks import Check, Group
-from qpmpc.verification.checks.physics_checks import constant_demand, engine_covers_demand
+from qpmpc.verification.checks.physics_checks import (
+    constant_demand,
+    engine_covers_demand,
+    uncoupled,
+)
 from qpmpc.verification.checks.pwa_checks import bounds_hold
 
 
@@ -29,7 +33,7 @@ def groups(monkeypatch):
     """Only these groups, real ones, because all of them take a minute."""
     chosen = [
         Group("Curves", (bounds_hold,)),
-        Group("Physics", (constant_demand, engine_covers_demand)),
+        Group("Physics", (constant_demand, engine_covers_demand, uncoupled)),
     ]
 
     class Chosen:

@@ -28,6 +28,8 @@ NO_HEAT: dict[str, object] = {
     "cold_engine.k": 0.0,
     "thermal.cabin_heat_w": 0.0,
     "thermal.t_cl_min_degc": -90.0,
+    "battery.derating_share_per_k": 0.0,
+    "chassis.road_load_share_per_k": 0.0,
 }
 # so much coolant that nothing heats it
 NO_HOT_LIMIT: dict[str, object] = {"thermal.heat_capacity_j_per_k": 1e9}
@@ -60,14 +62,15 @@ def monotone(context: Context) -> Iterator[Check]:
 
 
 def uncoupled(context: Context) -> Iterator[Check]:
-    """Without cold multiplier, cabin heat and lower limit, the weather does not matter."""
+    """With nothing that cold changes in engine, cabin, battery and road, weather is nothing."""
     fuel = [
         _fuel_g(context.vehicle.with_settings({**NO_HEAT, "thermal.t_amb_degc": t}))
         for t in (-7.0, 20.0)
     ]
     yield Check(
         "No thermal coupling",
-        "With alpha = 1 and no heat demand fuel does not depend on the weather.",
+        "With alpha = 1, no heat demand, and a battery and a road that know no cold fuel does not "
+        "depend on the weather.",
         TABLES,
         abs(fuel[0] / fuel[1] - 1.0),
         "relative",
