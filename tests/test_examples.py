@@ -13,6 +13,8 @@ SCRIPTS = sorted(file.name for file in FOLDER.glob("*.py"))
 # run where their figures are tested
 ELSEWHERE = ("engine_starts.py", "nox.py", "battery_temperature.py")
 
+ARGUMENTS = {"prototype_cost.py": ["10"]}  # seconds driven by each way
+
 
 @pytest.fixture(scope="module")
 def cache(tmp_path_factory: pytest.TempPathFactory) -> str:
@@ -26,7 +28,7 @@ def test_example(name: str, tmp_path: Path, cache: str) -> None:
     if name in ("embedded.py", "prototype_cost.py") and not all(map(shutil.which, ("make", "cc"))):
         pytest.skip("not installed: make, cc")
     done = subprocess.run(
-        [sys.executable, "-W", "error", FOLDER / name],
+        [sys.executable, "-W", "error", FOLDER / name, *ARGUMENTS.get(name, ())],
         cwd=tmp_path,
         env={**os.environ, "QPMPC_CACHE_DIR": cache},
         capture_output=True,

@@ -51,7 +51,6 @@ def test_the_other_car_on_a_mild_day(cli, tmp_path, monkeypatch, strict_json):
         for cycle in quick.cycles
     )
     monkeypatch.setattr(Extent, "quick", lambda: replace(quick, cycles=minutes))
-    monkeypatch.setenv("QPMPC_CACHE_DIR", str(tmp_path / "cache"))
     out, data = tmp_path / "out", tmp_path / "data.json"
     done = cli(
         *("reproduce", "--quick", "--out", out, "--json", data),
