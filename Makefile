@@ -39,16 +39,16 @@ types: $(STAMP)
 	cd $(TYPED) && ../../$(BIN)/mypy --config-file ../../pyproject.toml --cache-dir ../../.mypy_cache -p qpmpc
 
 docs: $(STAMP)
-	$(BIN)/python website/build.py build/site
+	$(BIN)/python docs/website/build.py build/site
 
 release-check:
-	$(PYTHON) release/check.py
+	$(PYTHON) .ci/release/check.py
 
 sbom: $(STAMP)
-	$(BIN)/python release/sbom.py build/sbom.cdx.json
+	$(BIN)/python .ci/release/sbom.py build/sbom.cdx.json
 
 history: $(STAMP)
-	$(BIN)/python release/history.py
+	$(BIN)/python .ci/release/history.py
 
 venv: $(STAMP)
 

@@ -23,7 +23,7 @@ WORKFLOW = ROOT / ".github" / "workflows" / "ci.yml"
 
 
 def program(name: str) -> ModuleType:
-    spec = util.spec_from_file_location(f"release_{name}", ROOT / "release" / f"{name}.py")
+    spec = util.spec_from_file_location(f"release_{name}", ROOT / ".ci" / "release" / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = util.module_from_spec(spec)

@@ -26,7 +26,7 @@ STYLES = re.compile(r"""<link\b[^>]*\bhref=["']?(https?:)?//""")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     folder = tmp_path_factory.mktemp("site")
     done = subprocess.run(
-        [sys.executable, ROOT / "website" / "build.py", folder],
+        [sys.executable, ROOT / "docs" / "website" / "build.py", folder],
         env={**os.environ, "QPMPC_CACHE_DIR": str(tmp_path_factory.mktemp("cache"))},
         capture_output=True,
         text=True,

@@ -18,7 +18,7 @@ import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 VERSIONS = ("3.11", "3.12", "3.13", "3.14")
 LEAST_SAVING_PERCENT = 20.0  # of mh-qp against the rules on NYCC: the goal of the project
 LIMIT_S = 900.0  # of one command: an installation on a slow line

@@ -7,7 +7,7 @@ from typing import Any
 from mkdocs.structure.files import File, Files
 from nbconvert import MarkdownExporter
 
-SOURCES = Path(__file__).resolve().parents[1] / "docs" / "notebooks"
+SOURCES = Path(__file__).resolve().parents[2] / "docs" / "notebooks"
 
 
 def on_files(files: Files, config: Any) -> Files:

@@ -13,7 +13,7 @@ from typer.cli import get_docs_for_click
 
 from qpmpc.cli.app import app
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 NAME = re.compile(r"^\| `([\w.]+)` \|", re.MULTILINE)
 MARKUP = re.compile(r"\[(b|dim)\](.*?)\[/\1\]")
 LIST = re.compile(r"^\*\*Commands\*\*:\n\n(\*.*\n)+\n", re.MULTILINE)

@@ -1,6 +1,6 @@
 """Extend the benchmark history by this commit, and draw it.
 
-``make history`` measures, puts the rows of the checked-out commit into release/history.csv,
+``make history`` measures, puts the rows of the checked-out commit into .ci/release/history.csv,
 in place of any it has there, and draws docs/images/history.png. Instructions are counted by QEMU
 and fuel is simulated: both are the same on every machine with the same compiler, and may be
 compared across commits. Times may not: with ``--wall``, on a machine that does nothing else, rows
@@ -24,8 +24,8 @@ from qpmpc.cycles import Cycle, cycle_names, load_cycle
 from qpmpc.files import write_bytes, write_text
 from qpmpc.report.provenance import provenance
 
-ROOT = Path(__file__).resolve().parents[1]
-HISTORY = ROOT / "release" / "history.csv"
+ROOT = Path(__file__).resolve().parents[2]
+HISTORY = ROOT / ".ci" / "release" / "history.csv"
 PICTURE = ROOT / "docs" / "images" / "history.png"
 CONTROLLERS = ("mh-qp", "mh-costate")
 STEPS = 6  # every step takes the same instructions
