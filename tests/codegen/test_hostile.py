@@ -45,7 +45,7 @@ def is_osqp(folder) -> bool:
 def test_hostile_seconds_break_no_promise_and_reach_everything(project) -> None:
     """Every step keeps its promises (promises.h) and, some seconds later, all is well again."""
     need("gcc")
-    steps = 1000 if is_osqp(project) else 20000
+    steps = 1000 if is_osqp(project) else 12000
     build(project, "gcc", STRICT, "fuzz", "-DFUZZ_MAIN", "fuzz_step.c", "promises.c", *SHARED)
     fuzzed = run(project, "./fuzz", SEED, str(steps))
     assert fuzzed.returncode == 0, fuzzed.stderr
