@@ -36,6 +36,24 @@ def compiler() -> str | None:
     return next((found for name in names if name and (found := shutil.which(name))), None)
 
 
+def required_compiler(without: str = "no C compiler found") -> str:
+    """Return the C compiler of this machine.
+
+    Parameters
+    ----------
+    without : begins the message if there is none
+
+    Raises
+    ------
+    CodegenError
+        If there is none.
+    """
+    command = compiler()
+    if command is None:
+        raise CodegenError(f"{without} (tried $CC, cc, gcc, clang)")
+    return command
+
+
 @cache
 def version(command: str, size: int, modified_ns: int) -> bytes:
     """Return what a compiler says of itself; its file may be a wrapper that stays the same."""
@@ -61,7 +79,7 @@ def library_of(
     sources = _sources(files) if common is None else [DATA]
     visible = ["-fvisibility=hidden"] if hidden else []
     advice = "" if hidden else ADVICE
-    return _made(command, files, [*FLAGS.split(), *visible, *objects, *sources, "-lm"], advice)
+    return made_by(command, files, [*FLAGS.split(), *visible, *objects, *sources, "-lm"], advice)
 
 
 def common_object(command: str, files: Mapping[str, str]) -> bytes:
@@ -73,17 +91,29 @@ def common_object(command: str, files: Mapping[str, str]) -> bytes:
         If the compiler fails.
     """
     sources = [name for name in _sources(files) if name != DATA]
-    return _made(command, files, [*RELOCATABLE.split(), *sources])
+    return made_by(command, files, [*RELOCATABLE.split(), *sources])
 
 
 def _sources(files: Mapping[str, str]) -> list[str]:
     return sorted(name for name in files if name.endswith(".c"))
 
 
-def _made(
+def made_by(
     command: str, files: Mapping[str, str], arguments: list[str], advice: str = ADVICE
 ) -> bytes:
-    """Write what the sources among the arguments may need, compile, and return what was made."""
+    """Write what the sources among the arguments may need, compile, and return what was made.
+
+    Parameters
+    ----------
+    files : by name; headers, and those that the arguments name, are written
+    arguments : of the compiler, without the name of what it makes
+    advice : ends the message of an error
+
+    Raises
+    ------
+    CodegenError
+        If the compiler fails, or cannot be run.
+    """
     try:
         with tempfile.TemporaryDirectory() as scratch:
             folder = Path(scratch)

@@ -6,10 +6,8 @@ are compiled here and on a target.
 """
 
 import ctypes
-import hashlib
 import io
 import platform
-import subprocess
 import tempfile
 from contextlib import redirect_stdout
 from importlib.util import find_spec
@@ -19,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpmpc.codegen.c_compiler import CodegenError, compiler
+from qpmpc.codegen.c_compiler import CodegenError, made_by
 from qpmpc.codegen.cvxpy_texts import (
     CONFIGURED,
     CORRECTED,
@@ -28,7 +26,7 @@ from qpmpc.codegen.cvxpy_texts import (
     PROGRAM_C,
     PROGRAM_H,
 )
-from qpmpc.codegen.library_cache import kept_file
+from qpmpc.codegen.kept_library import kept_library
 from qpmpc.controllers.cvxpy_planner import CvxpyPlanner
 from qpmpc.controllers.settings import SettingsLike
 from qpmpc.errors import InputError
@@ -151,30 +149,11 @@ def write_c(planner: CvxpyPlanner, folder: str | Path) -> Path:
 
 def _library(files: dict[str, str]) -> Path:
     """Compile the files into a library, kept by its contents."""
-    command = compiler()
-    if command is None:
-        raise CodegenError("no C compiler found (tried $CC, cc, gcc, clang)")
-    identity = f"{command} {FLAGS} {platform.machine()} {sorted(files.items())}"
-    key = hashlib.sha256(identity.encode()).hexdigest()[:24]
-    return kept_file(key, ".so", lambda: _compiled(command, files)).file
-
-
-def _compiled(command: str, files: dict[str, str]) -> bytes:
-    with tempfile.TemporaryDirectory() as scratch:
-        for name, text in files.items():
-            file = Path(scratch) / name
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_text(text, "utf-8")
-        sources = [name for name in files if name.endswith(".c")]
-        arguments = [command, *FLAGS, "-shared", "-o", "made", *sources, "-lm"]
-        done = subprocess.run(
-            arguments, cwd=scratch, capture_output=True, text=True, errors="replace", check=False
-        )
-        if done.returncode:
-            lines = done.stderr.strip().splitlines()
-            first = next((line for line in lines if "error" in line), "no library was built")
-            raise CodegenError(f"C compiler {command} failed: {first}")
-        return (Path(scratch) / "made").read_bytes()
+    sources = sorted(name for name in files if name.endswith(".c"))
+    arguments = [*FLAGS, "-shared", *sources, "-lm"]
+    return kept_library(
+        files, " ".join(FLAGS), lambda command, _: made_by(command, files, arguments, ""), ""
+    ).file
 
 
 class CompiledProgram:

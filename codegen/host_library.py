@@ -1,8 +1,6 @@
 """The generated controller as a shared library of this machine, built once and kept."""
 
 import ctypes
-import hashlib
-import platform
 from _ctypes import dlclose, dlsym
 from collections.abc import Mapping
 from functools import cache
@@ -13,16 +11,14 @@ from weakref import finalize
 from qpmpc.codegen.c_compiler import (
     DATA,
     FLAGS,
-    NEEDS_NONE,
     RELOCATABLE,
     CodegenError,
     common_object,
-    compiler,
     library_of,
-    version,
 )
 from qpmpc.codegen.examples import is_example
 from qpmpc.codegen.generate import Algorithm, Precision, project_files
+from qpmpc.codegen.kept_library import kept_library, key_of
 from qpmpc.codegen.library_cache import Kept, kept_file
 from qpmpc.codegen.values import Values
 from qpmpc.remarks import say_once
@@ -225,28 +221,8 @@ def compiled(files: Mapping[str, str]) -> Path:
 
 
 def _kept(files: Mapping[str, str]) -> Kept:
-    command = compiler()
-    if command is None:
-        raise CodegenError("no C compiler found (tried $CC, cc, gcc, clang)")
     sources = {n: t for n, t in files.items() if n.endswith((".c", ".h")) and not is_example(n)}
-    try:
-        found = Path(command).stat()
-        said = version(command, found.st_size, found.st_mtime_ns)
-        identity = f"{command, found.st_size, found.st_mtime_ns, platform.machine(), said}"
-        key = _key(f"{identity} {FLAGS}", sources)
-        kept = kept_file(key, ".so", lambda: _built(sources, command, identity))
-    except OSError as error:
-        raise CodegenError(f"no compiled controller: {error}; {NEEDS_NONE}") from error
-    if kept.remark:
-        say_once(kept.remark)
-    return kept
-
-
-def _key(identity: str, files: Mapping[str, str]) -> str:
-    digest = hashlib.sha256(identity.encode())
-    for name, text in files.items():
-        digest.update(f"{name}\0{text}\0".encode())
-    return digest.hexdigest()[:24]
+    return kept_library(sources, FLAGS, lambda *made_with: _built(sources, *made_with))
 
 
 def _built(files: Mapping[str, str], command: str, identity: str) -> bytes:
@@ -254,7 +230,7 @@ def _built(files: Mapping[str, str], command: str, identity: str) -> bytes:
     if DATA not in files or identity in _WITHOUT_OBJECTS:
         return library_of(command, files)
     others = {name: text for name, text in files.items() if name != DATA}
-    key = _key(f"{identity} {RELOCATABLE}", others)
+    key = key_of(f"{identity} {RELOCATABLE}", others)
     try:
         common = kept_file(key, ".o", lambda: common_object(command, others))
         return library_of(command, files, common.file)

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Callable
 
-from qpmpc.codegen.c_compiler import CodegenError, compiler
+from qpmpc.codegen.c_compiler import CodegenError, required_compiler
 from qpmpc.codegen.controller import GeneratedController
 from qpmpc.codegen.costate_controller import GeneratedCostate
 from qpmpc.controllers.base import Controller
@@ -70,8 +70,8 @@ def _made(
     reason, slower = "", SLOWER.format(section=name.replace("-", "_"))
     if implementation != "python":
         try:
-            if implementation == "auto" and compiler() is None:
-                raise CodegenError("no C compiler found (tried $CC, cc, gcc, clang)")
+            if implementation == "auto":
+                required_compiler()
             made = in_c()
             _log.info("%s runs as compiled C", name)
             return made

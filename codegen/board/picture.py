@@ -49,5 +49,5 @@ def board_chart(result: BoardResult) -> dict[str, Any]:
         Series("here", held(result.expected.power_w / 1e3), GREY, "here", stepped=True),
         Series("board", held(log.power_w / 1e3), VERMILION, "board", stepped=True),
     ]
-    groups = [{"name": each.name, "color": each.color} for each in power]
-    return over_time([Panel(label, [times], zero=True), Panel("engine power, kW", power)], groups)
+    panels = [Panel(label, [times], zero=True), Panel("engine power, kW", power)]
+    return over_time(panels, [each.as_group() for each in power])

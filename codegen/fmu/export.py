@@ -9,7 +9,7 @@ from io import BytesIO
 from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
-from qpmpc.codegen.c_compiler import CodegenError, compiler, library_of
+from qpmpc.codegen.c_compiler import library_of, required_compiler
 from qpmpc.codegen.fmu.description import About, Fmi, build_description, model_description
 from qpmpc.codegen.fmu.documentation import documentation
 from qpmpc.codegen.fmu.parts import Part
@@ -18,7 +18,7 @@ from qpmpc.codegen.prefix import FORM, with_prefix
 from qpmpc.errors import InputError
 from qpmpc.files import check_file, write_bytes
 
-COMMON = ("mpc_fmu.h", "mpc_fmu.c")
+COMMON = ("mpc_fmi.h", "mpc_fmu.h", "mpc_fmu.c")
 OF_FMI: dict[Fmi, tuple[str, ...]] = {
     "2": ("mpc_fmi2.c", "mpc_fmi2_unsupported.c", "mpc_fmi2.h"),
     "3": ("mpc_fmi3.c", "mpc_fmi3_unsupported.c", "mpc_fmi3.h"),
@@ -115,9 +115,7 @@ def _variables(part: Part, about: About) -> dict[str, str]:
 
 
 def _library(sources: Mapping[str, str]) -> bytes:
-    command = compiler()
-    if command is None:
-        raise CodegenError("an FMU needs a C compiler: none found (tried $CC, cc, gcc, clang)")
+    command = required_compiler("an FMU needs a C compiler: none found")
     return library_of(command, sources, hidden=True)
 
 

@@ -86,16 +86,7 @@ def controller_variables(vehicle: Vehicle, learning: bool, certificate: bool) ->
     return [
         TIME,
         _soc("input", "Measured state of charge of the battery", trip.soc_init),
-        Variable(
-            "t_cl_degc",
-            "input",
-            "Measured coolant temperature",
-            unit="degC",
-            start=trip.t_cl_init_degc,
-            low=can.coldest_degc,
-            high=can.hottest_degc,
-            continuous=True,
-        ),
+        _coolant("input", "Measured coolant temperature", vehicle, can),
         *_road("input", can),
         _engine_on("input"),
         *([fuel] if learning else []),
@@ -159,17 +150,7 @@ def plant_variables(vehicle: Vehicle, with_trip: bool) -> list[Variable]:
         *_command("input", vehicle),
         *_road("output" if with_trip else "input", can),
         _soc("output", "State of charge of the battery", trip.soc_init, ("soc_init",)),
-        Variable(
-            "t_cl_degc",
-            "output",
-            "Coolant temperature",
-            unit="degC",
-            start=trip.t_cl_init_degc,
-            low=can.coldest_degc,
-            high=can.hottest_degc,
-            at_start=("t_cl_init_degc",),
-            continuous=True,
-        ),
+        _coolant("output", "Coolant temperature", vehicle, can, ("t_cl_init_degc",)),
         _engine_on("output"),
         Variable("fuel_g", "output", "Fuel injected in the last second", unit="g", low=0.0),
         Variable("fuel_total_g", "output", "Fuel injected since departure", unit="g", low=0.0),
@@ -200,6 +181,26 @@ def _soc(
         low=0.0,
         high=1.0,
         display="%",
+        at_start=at_start,
+        continuous=True,
+    )
+
+
+def _coolant(
+    role: Role,
+    description: str,
+    vehicle: Vehicle,
+    can: Capability,
+    at_start: tuple[str, ...] | None = None,
+) -> Variable:
+    return Variable(
+        "t_cl_degc",
+        role,
+        description,
+        unit="degC",
+        start=vehicle.trip.t_cl_init_degc,
+        low=can.coldest_degc,
+        high=can.hottest_degc,
         at_start=at_start,
         continuous=True,
     )

@@ -6,7 +6,7 @@ from typing import Any
 
 from qpmpc.codegen.pil.loop import PilResult
 from qpmpc.codegen.pil.pictures import LINES
-from qpmpc.report.charts import DASHED, Panel, Series, held, numbers, over_time, scatter
+from qpmpc.report.charts import Panel, Series, dashes, held, numbers, over_time, scatter
 from qpmpc.report.columns import violations_text
 from qpmpc.report.html import html_page
 from qpmpc.report.provenance import provenance
@@ -132,7 +132,7 @@ def _run_chart(result: PilResult) -> dict[str, Any]:
         Panel("engine power, kW", power),
         Panel("command error, W", [Series("error", held(result.command_error_w), BLACK)]),
     ]
-    return over_time(panels, [{"name": each.name, "color": each.color} for each in power])
+    return over_time(panels, [each.as_group() for each in power])
 
 
 def _pareto_chart(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -140,19 +140,19 @@ def _pareto_chart(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     present = {(row["algorithm"], row["precision"]) for row in rows}
     families = {key: style for key, style in LINES.items() if key in present}
     series = []
-    for key, (color, dashes) in families.items():
+    for key, (color, style) in families.items():
         values = [
             row["fuel_above_dp_percent"]
             if (row["algorithm"], row["precision"]) == key
             else float("nan")
             for row in rows
         ]
-        dash = DASHED if dashes != "-" else []
-        series.append(Series(" ".join(key), numbers(values), color, " ".join(key), dash))
+        name = " ".join(key)
+        series.append(Series(name, numbers(values), color, name, dashes(style)))
     return scatter(
         [row["instructions"]["median"] / 1e6 for row in rows],
         "instructions per step, millions",
         Panel("SOC-balanced fuel above DP, %", series, height=320),
         [f"K = {row['iterations']}, {row['algorithm']} {row['precision']}" for row in rows],
-        [{"name": each.name, "color": each.color, "dash": each.dash} for each in series],
+        [each.as_group() for each in series],
     )

@@ -34,7 +34,9 @@ def _controllers() -> Iterable[str]:
 
 
 def _generated() -> Iterable[str]:
-    return "mh-qp", "mh-costate"
+    from qpmpc.codegen.method import GENERATED
+
+    return GENERATED
 
 
 def _studies() -> Iterable[str]:

@@ -40,6 +40,10 @@ class Series:
     fill: bool = False
     aside: bool = False
 
+    def as_group(self) -> dict[str, Any]:
+        """Return the group of this line as the page lists it, to be left out."""
+        return {"name": self.group, "color": self.color, "dash": self.dash}
+
 
 @dataclass(frozen=True)
 class Panel:
@@ -67,14 +71,7 @@ def over_time(panels: Sequence[Panel], groups: Sequence[dict[str, Any]] = ()) ->
     groups : name, color and dash of what can be left out
     """
     count = max(len(series.values) for panel in panels for series in panel.series)
-    data: dict[str, Any] = {
-        "count": count,
-        "x_label": "time, s",
-        "x_name": "s",
-        "groups": list(groups),
-    }
-    data["panels"] = [asdict(panel) for panel in panels]
-    return _plain(data)
+    return _chart({"count": count, "x_label": "time, s", "x_name": "s"}, panels, groups)
 
 
 def lines(
@@ -85,8 +82,7 @@ def lines(
     groups: Sequence[dict[str, Any]],
 ) -> dict[str, Any]:
     """Return a chart of lines over any axis; x rises."""
-    data = {"x": numbers(x), "x_label": label, "x_name": unit, "groups": list(groups)}
-    return _plain(data | {"panels": [asdict(panel) for panel in panels]})
+    return _chart({"x": numbers(x), "x_label": label, "x_name": unit}, panels, groups)
 
 
 def scatter(
@@ -97,16 +93,8 @@ def scatter(
     groups: Sequence[dict[str, Any]],
 ) -> dict[str, Any]:
     """Return a chart of points on a logarithmic axis; x rises, each point has a name."""
-    data = {
-        "x": numbers(x),
-        "x_label": label,
-        "x_log": True,
-        "points": True,
-        "labels": list(labels),
-        "groups": list(groups),
-        "panels": [asdict(panel)],
-    }
-    return _plain(data)
+    axis = {"x": numbers(x), "x_label": label, "x_log": True}
+    return _chart(axis | {"points": True, "labels": list(labels)}, [panel], groups)
 
 
 def run_chart(
@@ -146,10 +134,7 @@ def run_chart(
         for run, style in zip(runs, styles, strict=True)
     ]
     panels.append(Panel("fuel burnt, g", fuel, zero=True))
-    groups = [
-        {"name": style["group"], "color": style["color"], "dash": style["dash"]} for style in styles
-    ]
-    return over_time(panels, groups)
+    return over_time(panels, [each.as_group() for each in fuel])
 
 
 def numbers(values: ArrayLike) -> list[float | None]:
@@ -164,9 +149,13 @@ def held(values: ArrayLike) -> list[float | None]:
     return [*found, *found[-1:]]
 
 
+def dashes(linestyle: object) -> list[int]:
+    """Return the dashes of one of matplotlib's line styles; a solid line has none."""
+    return [] if linestyle == "-" else DASHED
+
+
 def _line(name: str, style: dict[str, Any]) -> dict[str, Any]:
-    dash = DASHED if style["linestyle"] != "-" else []
-    return {"color": style["color"], "dash": dash, "group": name}
+    return {"color": style["color"], "dash": dashes(style["linestyle"]), "group": name}
 
 
 def _powers(run: Run, group: str) -> list[Series]:
@@ -202,6 +191,13 @@ def _faults(runs: Sequence[Run]) -> list[Series]:
 
 def _limit(name: str, value: float, count: int) -> Series:
     return Series(name, numbers([value] * count), str(LIMIT["color"]), dash=[2, 3], aside=True)
+
+
+def _chart(
+    data: dict[str, Any], panels: Sequence[Panel], groups: Sequence[dict[str, Any]]
+) -> dict[str, Any]:
+    panel_data = [asdict(panel) for panel in panels]
+    return _plain(data | {"groups": list(groups), "panels": panel_data})
 
 
 def _plain(data: dict[str, Any]) -> dict[str, Any]:

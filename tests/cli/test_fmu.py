@@ -95,7 +95,7 @@ def test_a_trip_that_the_car_cannot_do_is_no_preview(cli, tmp_path):
 
 
 def test_without_a_compiler_it_says_so(cli, tmp_path, monkeypatch):
-    monkeypatch.setattr("qpmpc.codegen.fmu.export.compiler", lambda: None)
+    monkeypatch.setattr("qpmpc.codegen.c_compiler.compiler", lambda: None)
     done = cli("fmu", tmp_path / "a.fmu", "--part", "plant")
     assert (done.code, done.out) == (1, "")
     assert done.err == (

@@ -224,11 +224,11 @@ def test_which_implementation_runs(road, monkeypatch):
 
     assert isinstance(made("auto"), GeneratedCostate)
     assert made("python").implementation == "python"
-    monkeypatch.setattr("qpmpc.codegen.implementation.compiler", lambda: None)
+    monkeypatch.setattr("qpmpc.codegen.c_compiler.compiler", lambda: None)
     fallen = made("auto")
     assert fallen.implementation == "python"
     assert any("mh_costate.implementation=python" in line for line in fallen.remarks)
-    monkeypatch.setattr("qpmpc.codegen.host_library.compiler", lambda: None)
+    monkeypatch.setattr("qpmpc.codegen.c_compiler.compiler", lambda: None)
     with pytest.raises(CodegenError, match="no C compiler"):
         made("c")
 

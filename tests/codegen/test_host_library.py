@@ -416,7 +416,7 @@ def test_default_is_generated_c_where_it_can_be_and_osqp_elsewhere(monkeypatch) 
     with pytest.raises(InputError, match="blocks"):
         made(mh_qp__implementation="c", **no_blocks)
     with monkeypatch.context() as patch:
-        patch.setattr("qpmpc.codegen.implementation.compiler", lambda: None)
+        patch.setattr("qpmpc.codegen.c_compiler.compiler", lambda: None)
         assert made() == in_python
 
 

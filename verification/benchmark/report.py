@@ -107,5 +107,5 @@ def pareto_chart(found: Sequence[Point]) -> dict[str, Any] | None:
             height=380,
         ),
         labels,
-        [{"name": name, "color": FAMILY_COLORS[name]} for name in families],
+        [each.as_group() for each in series],
     )

@@ -11,16 +11,13 @@ typedef struct {
     char *name;
 } instance;
 
-static const char *const categories[] = {"", "logStatusWarning", "logStatusDiscard",
-                                         "logStatusError"};
-
 /* Messages are formats of printf here, and ours hold no percent sign. Some importers do not expand
  * them. Warnings and errors are logged whether debug logging is on or off: there is no other kind. */
 static fmi2Status told(instance *of, int32_t status)
 {
     if ((status != MPC_FMU_OK) && (of->functions.logger != NULL)) {
         of->functions.logger(of->functions.componentEnvironment, of->name, (fmi2Status)status,
-                             categories[status], of->fmu.message);
+                             mpc_fmu_categories[status], of->fmu.message);
     }
     return (fmi2Status)status;
 }
@@ -49,8 +46,8 @@ static fmi2Component not_made(const fmi2CallbackFunctions *functions, fmi2String
                               const char *why)
 {
     if ((functions != NULL) && (functions->logger != NULL)) {
-        functions->logger(functions->componentEnvironment, name, fmi2Error, categories[fmi2Error],
-                          why);
+        functions->logger(functions->componentEnvironment, name, fmi2Error,
+                          mpc_fmu_categories[fmi2Error], why);
     }
     return NULL;
 }
@@ -190,12 +187,10 @@ STATUS NAME(fmi2GetBooleanStatus)(fmi2Component c, const fmi2StatusKind kind, fm
 
 STATUS NAME(fmi2GetFMUstate)(fmi2Component c, fmi2FMUstate *state)
 {
+    mpc_fmu_state *const kept = mpc_fmu_kept(&((instance *)c)->fmu, (mpc_fmu_state *)*state);
     fmi2Status status = fmi2OK;
-    if (*state == NULL) {
-        *state = calloc(1, sizeof(mpc_fmu_state));
-    }
-    if (*state != NULL) {
-        *(mpc_fmu_state *)*state = ((instance *)c)->fmu.state;
+    if (kept != NULL) {
+        *state = kept;
     } else {
         status = mpc_fmi2_refuse(c, "not enough memory");
     }

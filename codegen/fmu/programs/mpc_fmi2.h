@@ -5,21 +5,14 @@
 
 #include <stddef.h>
 
+#include "mpc_fmi.h"
+
 /* Names of functions get FMI2_FUNCTION_PREFIX, if the build has one: to link several FMUs into one
  * program. In a shared library they have none. */
 #if defined(FMI2_FUNCTION_PREFIX) && !defined(FMI2_OVERRIDE_FUNCTION_PREFIX)
-#define PASTE_NAMES(a, b) a##b
-#define PASTE(a, b) PASTE_NAMES(a, b)
 #define NAME(name) PASTE(FMI2_FUNCTION_PREFIX, name)
 #else
 #define NAME(name) name
-#endif
-#if defined(_WIN32)
-#define EXPORT __declspec(dllexport)
-#elif defined(__GNUC__)
-#define EXPORT __attribute__((visibility("default")))
-#else
-#define EXPORT
 #endif
 #define STATUS EXPORT fmi2Status
 

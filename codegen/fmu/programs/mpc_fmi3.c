@@ -11,14 +11,11 @@ typedef struct {
     fmi3InstanceEnvironment environment;
 } instance;
 
-static const char *const categories[] = {"", "logStatusWarning", "logStatusDiscard",
-                                         "logStatusError"};
-
 /* Warnings and errors are logged whether debug logging is on or off: there is no other kind. */
 static fmi3Status told(instance *of, int32_t status)
 {
     if ((status != MPC_FMU_OK) && (of->log != NULL)) {
-        of->log(of->environment, (fmi3Status)status, categories[status], of->fmu.message);
+        of->log(of->environment, (fmi3Status)status, mpc_fmu_categories[status], of->fmu.message);
     }
     return (fmi3Status)status;
 }
@@ -45,7 +42,7 @@ static fmi3Instance not_made(fmi3InstanceEnvironment environment, fmi3LogMessage
                              const char *why)
 {
     if (log != NULL) {
-        log(environment, fmi3Error, categories[fmi3Error], why);
+        log(environment, fmi3Error, mpc_fmu_categories[fmi3Error], why);
     }
     return NULL;
 }
@@ -168,12 +165,10 @@ STATUS NAME(fmi3DoStep)(fmi3Instance c, fmi3Float64 from_s, fmi3Float64 step_s,
 
 STATUS NAME(fmi3GetFMUState)(fmi3Instance c, fmi3FMUState *state)
 {
+    mpc_fmu_state *const kept = mpc_fmu_kept(&((instance *)c)->fmu, (mpc_fmu_state *)*state);
     fmi3Status status = fmi3OK;
-    if (*state == NULL) {
-        *state = calloc(1, sizeof(mpc_fmu_state));
-    }
-    if (*state != NULL) {
-        *(mpc_fmu_state *)*state = ((instance *)c)->fmu.state;
+    if (kept != NULL) {
+        *state = kept;
     } else {
         status = mpc_fmi3_refuse(c, "not enough memory");
     }

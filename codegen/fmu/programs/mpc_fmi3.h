@@ -7,21 +7,14 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "mpc_fmi.h"
+
 /* Names of functions get FMI3_FUNCTION_PREFIX, if the build has one: to link several FMUs into one
  * program. In a shared library they have none. */
 #if defined(FMI3_FUNCTION_PREFIX) && !defined(FMI3_OVERRIDE_FUNCTION_PREFIX)
-#define PASTE_NAMES(a, b) a##b
-#define PASTE(a, b) PASTE_NAMES(a, b)
 #define NAME(name) PASTE(FMI3_FUNCTION_PREFIX, name)
 #else
 #define NAME(name) name
-#endif
-#if defined(_WIN32)
-#define EXPORT __declspec(dllexport)
-#elif defined(__GNUC__)
-#define EXPORT __attribute__((visibility("default")))
-#else
-#define EXPORT
 #endif
 #define STATUS EXPORT fmi3Status
 

@@ -1,12 +1,16 @@
 /* One instance of this FMU: variables, modes, steps of a second. */
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 #include "mpc_fmu.h"
 
 #define STEP_S 1.0
 #define STEP_TOLERANCE_S 1e-9
 #define TIME_TOLERANCE_S 1e-6 /* of a sum of seconds */
+
+const char *const mpc_fmu_categories[4] = {"", "logStatusWarning", "logStatusDiscard",
+                                           "logStatusError"};
 
 static const char *const mode_names[] = {"instantiated", "initialization", "step", "terminated"};
 
@@ -60,14 +64,20 @@ int32_t mpc_fmu_setup(mpc_fmu *fmu, double start_s)
     return status;
 }
 
-int32_t mpc_fmu_enter(mpc_fmu *fmu)
+/* From one mode to another. */
+static int32_t moved(mpc_fmu *fmu, int32_t from, int32_t to, const char *call)
 {
     int32_t status = MPC_FMU_ERROR;
-    if (is_between(fmu, MPC_FMU_INSTANTIATED, MPC_FMU_INSTANTIATED, "initialization") != 0) {
-        fmu->state.mode = MPC_FMU_INITIALISING;
+    if (is_between(fmu, from, from, call) != 0) {
+        fmu->state.mode = to;
         status = MPC_FMU_OK;
     }
     return status;
+}
+
+int32_t mpc_fmu_enter(mpc_fmu *fmu)
+{
+    return moved(fmu, MPC_FMU_INSTANTIATED, MPC_FMU_INITIALISING, "initialization");
 }
 
 static int32_t has_parameters(mpc_fmu *fmu)
@@ -101,12 +111,17 @@ int32_t mpc_fmu_exit(mpc_fmu *fmu)
 
 int32_t mpc_fmu_terminate(mpc_fmu *fmu)
 {
-    int32_t status = MPC_FMU_ERROR;
-    if (is_between(fmu, MPC_FMU_STEPPING, MPC_FMU_STEPPING, "termination") != 0) {
-        fmu->state.mode = MPC_FMU_TERMINATED;
-        status = MPC_FMU_OK;
+    return moved(fmu, MPC_FMU_STEPPING, MPC_FMU_TERMINATED, "termination");
+}
+
+mpc_fmu_state *mpc_fmu_kept(const mpc_fmu *fmu, mpc_fmu_state *earlier)
+{
+    mpc_fmu_state *const kept =
+        (earlier != NULL) ? earlier : (mpc_fmu_state *)calloc(1, sizeof(mpc_fmu_state));
+    if (kept != NULL) {
+        *kept = fmu->state;
     }
-    return status;
+    return kept;
 }
 
 double mpc_fmu_time_s(const mpc_fmu *fmu)

@@ -39,6 +39,8 @@ typedef struct {
     const char *name;
 } mpc_fmu_variable;
 
+extern const char *const mpc_fmu_categories[4]; /* of messages, by status */
+
 extern const mpc_fmu_variable mpc_fmu_variables[MPC_FMU_VARIABLES]; /* by value reference */
 
 /* Outputs of the last step; inputs that came after it; outputs that follow from these. */
@@ -71,6 +73,8 @@ int32_t mpc_fmu_get(mpc_fmu *fmu, uint32_t reference, int32_t kind, double *valu
 int32_t mpc_fmu_set(mpc_fmu *fmu, uint32_t reference, int32_t kind, double value);
 int32_t mpc_fmu_refuse(mpc_fmu *fmu, const char *what);
 double mpc_fmu_time_s(const mpc_fmu *fmu);
+/* A copy of the state, into the memory of an earlier copy if there is one; NULL without memory. */
+mpc_fmu_state *mpc_fmu_kept(const mpc_fmu *fmu, mpc_fmu_state *earlier);
 int32_t mpc_fmu_has_arrived(const mpc_fmu *fmu); /* whether the trip is over */
 
 /* The part: its outputs at the start, from the parameters; leaving initialisation; the outputs that

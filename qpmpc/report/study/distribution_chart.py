@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from qpmpc.report.charts import DASHED, Panel, Series, lines, numbers
+from qpmpc.report.charts import Panel, Series, dashes, lines, numbers
 from qpmpc.report.study.figures import Measure, short
 from qpmpc.report.study.pictures import LONGEST, panels_of, styles_of
 
@@ -29,16 +29,16 @@ def distribution_chart(
     columns : that name a group
     """
     known = table[table[measure.key].notna()]
-    panels, groups = [], {}
+    panels, groups, styles = [], {}, styles_of(table)
     for title, parts in panels_of(known, columns):
         series = []
         for controller, part in parts:
-            style, name = styles_of(table)[controller], short(controller, LONGEST)
+            style, name = styles[controller], short(controller, LONGEST)
             values = np.quantile(
                 part[measure.key].to_numpy(float), SHARES_PERCENT / 100.0, method="inverted_cdf"
             )
-            dash = DASHED if style["linestyle"] != "-" else []
-            groups[name] = {"name": name, "color": style["color"], "dash": dash}
+            dash = dashes(style["linestyle"])
             series.append(Series(name, numbers(values), style["color"], name, dash, stepped=True))
+            groups[name] = series[-1].as_group()
         panels.append(Panel(f"{title}: {measure.heading}", series, height=240))
     return lines(SHARES_PERCENT, "share of the runs, %", "%", panels, list(groups.values()))

@@ -1,13 +1,6 @@
 "use strict";
 // Charts of panels over one common axis: zoom and cursor are linked, groups can be left out.
 {
-  const make = (tag, text, className) => {
-    const node = document.createElement(tag);
-    if (text) node.textContent = text;
-    if (className) node.className = className;
-    if (tag === "button") node.type = "button";
-    return node;
-  };
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   // black lines are drawn in the colour of text: on dark paper too they are seen
   const colour = (value) => (value === "#000000" ? css("--ink") : value);

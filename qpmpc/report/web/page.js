@@ -1,14 +1,14 @@
 "use strict";
+// Of all scripts of a page, which follow in the same element.
+const make = (tag, text, className) => {
+  const node = document.createElement(tag);
+  if (text) node.textContent = text;
+  if (className) node.className = className;
+  if (tag === "button") node.type = "button";
+  return node;
+};
 // Switch of light and dark, sorting and CSV of the tables: all by keyboard too.
 {
-  const make = (tag, text, className) => {
-    const node = document.createElement(tag);
-    if (text) node.textContent = text;
-    if (className) node.className = className;
-    if (tag === "button") node.type = "button";
-    return node;
-  };
-
   const root = document.documentElement;
   const theme = make("button", "", "theme");
   const dark = () => (root.dataset.theme || (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light")) === "dark";
