@@ -1,7 +1,7 @@
 """The generated C controller behind the Python API of any controller."""
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from time import perf_counter
 from typing import Any
 
@@ -120,6 +120,7 @@ class GeneratedController(Controller):
         self._receive = self._preview.receive
         self.inputs = InputBuilder(self._receive)
         self._state = ctypes.create_string_buffer(self.library.state_bytes)
+        self._calibrated: dict[str, float] = {}
         self._in, self._out = self.library.input_type(), self.library.output_type()
         self._arguments = (self._state, ctypes.byref(self._in), ctypes.byref(self._out))
 
@@ -166,6 +167,23 @@ class GeneratedController(Controller):
     def forget(self) -> None:
         """Forget plan, warm start and the rules' memory, as after a restart of the ECU."""
         self.library.init(self._state)
+        self.library.calibrate(self._state, self._calibrated)
+
+    def calibrate(self, numbers: Mapping[str, float]) -> None:
+        """Change numbers of the calibration from the next second on; they are kept after a restart.
+
+        Parameters
+        ----------
+        numbers : by name, in SI units, see docs/calibration.md. A value out of bounds is refused
+            in C: `Flag.BAD_CALIBRATION`, and all numbers stay as they were
+
+        Raises
+        ------
+        InputError
+            If there is no such number.
+        """
+        self.library.calibrate(self._state, numbers)
+        self._calibrated |= numbers
 
     def plan(self) -> tuple[Floats, Floats]:
         """Return the last solution in SI units: variables (n, variables), duals (n, rows)."""

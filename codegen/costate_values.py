@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from qpmpc.codegen.calibration import Bounds, calibration_of
 from qpmpc.codegen.forecast_values import fixed_block_s
 from qpmpc.codegen.shared_values import shared_values
 from qpmpc.codegen.values import CONSTANTS_OF_ALL, Values, of_modules
@@ -33,13 +34,11 @@ CONSTANTS = CONSTANTS_OF_ALL | of_modules(
     (funnel, "ENDLESS_RESPONSE LEAST_RESPONSE UNLIMITED"),
     (
         solve,
-        "CHARGE_HALF_STEPS HEAT_HALF_STEPS LEAST_RISE_G BACKGROUND LEAST_DECAY AT_SLACK FIRST_SHARE"
-        " MOST_SHARE GROWS SHRINKS STREAK",
+        "CHARGE_HALF_STEPS HEAT_HALF_STEPS BACKGROUND LEAST_DECAY AT_SLACK MOST_SHARE GROWS SHRINKS"
+        " STREAK",
     ),
     (certificate, "ABOVE_MULTIPLIERS"),
 )
-SWITCH = "SWITCH_G_PER_S LONG_SWITCH_G_PER_S"
-START_SWITCH = "START_SWITCH_G_PER_S START_LONG_SWITCH_G_PER_S"
 
 
 def costate_values_of(
@@ -98,11 +97,13 @@ def costate_values_of(
         },
         "shared": _for_bisection(envelope, stride),
     }
+    calibration = calibration_of(vehicle, scalars, table.has_start, search=_search(table.has_start))
     return Values(
         vehicle=vehicle.name,
         table=table,
         sizes=shared.sizes,
-        scalars=scalars,
+        scalars=calibration.without(scalars),
+        calibration=calibration,
         arrays=arrays,
         iterations=settings.rounds,
         departure_iterations=mh_costate.DEPARTURE_ROUNDS,
@@ -112,7 +113,8 @@ def costate_values_of(
         learning=False,
         departure_linearisations=mh_costate.DEPARTURE_LINEARISATIONS,
         warm_up_steps=1,
-        constants=CONSTANTS | of_modules((dual, _names_of_dual(table.has_start))),
+        constants=CONSTANTS
+        | of_modules((dual, "LEAST_SWITCH_G" + (" START_HALF_STEPS" if table.has_start else ""))),
         costate={
             "SHARED_PIECES": len(envelope.slope),
             "SHARED_STRIDE": stride,
@@ -135,6 +137,14 @@ def _for_bisection(envelope: Curves, stride: int) -> Floats:
     return table
 
 
-def _names_of_dual(has_start: bool) -> str:
-    """Names of the constants of the dual that this car needs."""
-    return f"LEAST_SWITCH_G {f'{START_SWITCH} START_HALF_STEPS' if has_start else SWITCH}"
+def _search(has_start: bool) -> dict[str, tuple[float, Bounds]]:
+    """Numbers of the search that are tuned, with their bounds: a tenth of them to ten times."""
+    second, longer = dual.SWITCH_G_PER_S, dual.LONG_SWITCH_G_PER_S
+    if has_start:
+        second, longer = dual.START_SWITCH_G_PER_S, dual.START_LONG_SWITCH_G_PER_S
+    return {
+        "search_least_rise_g": (solve.LEAST_RISE_G, (1e-9, 1e-2)),
+        "search_first_share": (solve.FIRST_SHARE, (0.1, solve.MOST_SHARE)),
+        "search_switch_g_per_s": (second, (0.1 * second, 10.0 * second)),
+        "search_long_switch_g_per_s": (longer, (0.1 * longer, 10.0 * longer)),
+    }

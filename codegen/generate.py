@@ -16,6 +16,7 @@ from qpmpc.codegen.osqp_source import CONSTANT_ARRAYS, PREFIX, osqp_files, osqp_
 from qpmpc.codegen.prefix import checked_prefix, with_prefix
 from qpmpc.codegen.rows.costate_c import costate_files
 from qpmpc.codegen.rows.solver_c import rows_files
+from qpmpc.codegen.rows.stage_c import places_of
 from qpmpc.codegen.values import Values
 from qpmpc.errors import InputError
 from qpmpc.files import check_folder, write_text
@@ -115,6 +116,8 @@ def project_files(
         files |= texts_of("cortex_m7")
     context = _context(values, target, precision, algorithm)
     templates = {
+        "mpc_calibration.h": "mpc_calibration.h.j2",
+        "mpc_calibration_orders.h": "mpc_calibration_orders.h.j2",
         "mpc_config.h": "mpc_config.h.j2",
         "mpc_constants.h": "mpc_constants.h.j2",
         "mpc_data.c": "mpc_data.c.j2",
@@ -158,10 +161,10 @@ def _runtime(values: Values, algorithm: Algorithm) -> dict[str, str]:
         for name, text in texts.items()
         if name not in left_out and (is_costate or not name.startswith(OF_COSTATE))
     }
-    scalars = tuple(values.scalars)
+    places = places_of(values.scalars, values.calibration.names)
     if is_costate:
-        return files | costate_files(values.table, scalars)
-    return files | rows_files(values.table, scalars, algorithm, values.learning)
+        return files | costate_files(values.table, places)
+    return files | rows_files(values.table, places, algorithm, values.learning)
 
 
 def one_of(name: str, names: tuple[Name, ...], what: str) -> Name:
@@ -255,6 +258,8 @@ def _context(
         ],
         "scalars": scalars | counts,
         "counts": counts,
+        "calibration": values.calibration,
+        "literal": literal,
         "arrays": {name: literals(array, precision) for name, array in values.arrays.items()},
         "fuel_stride": 1 << ((values.sizes.fuel_points - 1).bit_length() - 1),
         "stretch": _STRETCH.get(exponent, power),

@@ -17,13 +17,13 @@ from qpmpc.codegen.c_compiler import (
     library_of,
 )
 from qpmpc.codegen.examples import is_example
-from qpmpc.codegen.generate import Algorithm, Precision, project_files
+from qpmpc.codegen.generate import Algorithm, Precision, one_of, project_files
 from qpmpc.codegen.kept_library import kept_library, key_of
 from qpmpc.codegen.library_cache import Kept, kept_file
 from qpmpc.codegen.values import Values
 from qpmpc.remarks import say_once
 
-ABI_VERSION = 7
+ABI_VERSION = 8
 _ABI_NAMES = (
     "version",
     "sizeof mpc_real",
@@ -37,8 +37,10 @@ _ABI_NAMES = (
     "MPC_ITERATIONS",
     "offset of short_count",
     "offset of engine_on",
+    "offset of calibration",
+    "MPC_CAL_ENTRIES",
 )
-_STATE = 4
+_STATE, _CALIBRATION = 4, 12
 _RETURNS_INT = ctypes.CFUNCTYPE(ctypes.c_int32)
 # Before mpc_step.c in a library whose solver fails where it is told to.
 MAY_FAIL = """#include <stdint.h>
@@ -87,6 +89,7 @@ def structures(precision: Precision, short: int, long: int, learning: bool) -> t
             ("rung", ctypes.c_int32),
             ("flags", ctypes.c_int32),
             ("iterations", ctypes.c_int32),
+            ("wrong_entry", ctypes.c_int32),
         ]
 
     return MpcIn, MpcOut
@@ -158,7 +161,7 @@ class HostLibrary:
         except OSError as error:
             raise CodegenError(f"{file} cannot be loaded: {error}") from error
         found = [abi(i) for i in range(len(_ABI_NAMES))]
-        self.state_bytes = found[_STATE]
+        self.state_bytes, self._calibration_at = found[_STATE], found[_CALIBRATION]
         expected = [
             ABI_VERSION,
             ctypes.sizeof(self.real),
@@ -172,11 +175,26 @@ class HostLibrary:
             values.iterations,
             self.input_type.short_count.offset,
             self.output_type.engine_on.offset,
+            self._calibration_at,
+            len(values.calibration.names),
         ]
         for name, have, want in zip(_ABI_NAMES, found, expected, strict=True):
             if have != want:
                 raise CodegenError(f"{file}: {name} is {have}, expected {want}")
         self.solver_may_succeed: ctypes.c_int32 | None = None
+
+    def calibrate(self, state: ctypes.Array[ctypes.c_char], numbers: Mapping[str, float]) -> None:
+        """Write numbers into the calibration of a state, as a tool does; the next step checks them.
+
+        Raises
+        ------
+        InputError
+            If there is no such number.
+        """
+        names = self.values.calibration.names
+        page = (self.real * len(names)).from_buffer(state, self._calibration_at)
+        for name, number in numbers.items():
+            page[names.index(one_of(name, names, "number of the calibration"))] = number
 
 
 def build_host_library(

@@ -6,9 +6,10 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
+from qpmpc.codegen.calibration import Calibration, calibration_of
 from qpmpc.codegen.forecast_values import fixed_block_s
 from qpmpc.codegen.shared_values import Sizes, shared_values
-from qpmpc.controllers import monitor, qp_planner, ramp, realise, safety
+from qpmpc.controllers import monitor, qp_planner, ramp, safety
 from qpmpc.controllers.qp_planner import DEPARTURE_LINEARISATIONS, WARM_UP_STEPS
 from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS
 from qpmpc.controllers.settings import MhQpSettings, RuleBasedSettings
@@ -40,7 +41,6 @@ def of_modules(*modules: tuple[ModuleType, str]) -> dict[str, dict[str, float]]:
 
 CONSTANTS_OF_ALL = of_modules(
     (ramp, "SOC_KEPT"),
-    (realise, "ON_THRESHOLD"),
     (linearisation, "COLDEST_DEGC HOTTEST_DEGC DEPARTURE_FUEL_G_PER_S DEPARTURE_P_ENG_W"),
     (safety, "POWER_MARGIN_W SOC_MARGIN T_CL_MARGIN_K"),
     (monitor, "LONG_AGO_S LONGEST_GAP_S"),
@@ -79,6 +79,7 @@ class Values:
     table : of its QP
     sizes : dimensions
     scalars, counts, arrays : members of the runtime's `mpc_model`
+    calibration : those of its `mpc_calibration`
     iterations, departure_iterations : K of a step and of each linearisation before the trip
     departure_linearisations, plan_valid_steps, warm_up_steps : as in the Python controller
     duration_exponent : of the column scaling
@@ -99,6 +100,7 @@ class Values:
     counts: dict[str, int]
     block_s: int
     learning: bool
+    calibration: Calibration
     departure_linearisations: int = DEPARTURE_LINEARISATIONS
     plan_valid_steps: int = PLAN_VALID_STEPS
     warm_up_steps: int = WARM_UP_STEPS
@@ -174,11 +176,17 @@ def values_of(
         scalars["learned_most_g"] = learner.most_g
         arrays["learned_power_w"] = learner.power_w
         arrays["learned_map_g_per_s"] = learner.map_g_per_s
+    table = table_of(vehicle.engine)
+    band_soc = 0.0 if settings.qp.soc_penalty_g else EQUALITY_WIDTH * scalars["unit_soc"]
+    calibration = calibration_of(
+        vehicle, scalars, table.has_start, settings.learning, band_soc=band_soc
+    )
     return Values(
         vehicle=vehicle.name,
-        table=table_of(vehicle.engine),
+        table=table,
         sizes=shared.sizes,
-        scalars=scalars,
+        scalars=calibration.without(scalars),
+        calibration=calibration,
         arrays=arrays,
         iterations=settings.admm.iterations,
         departure_iterations=settings.admm.cold_iterations,

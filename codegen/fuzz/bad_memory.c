@@ -1,8 +1,8 @@
 /* Memory that is no controller's, or a controller's with a part overwritten: bad_memory STRIDE.
  *
  * Never initialised: mpc_depart refuses, mpc_step says MPC_BAD_STATE and its rules drive. Then, one
- * after the other, every byte of the counts and marks and every STRIDE-th of the stages of a good
- * state is flipped, and every word there overwritten: every step keeps its promises, and all is
+ * after the other, every byte of the counts, marks and calibrations and every STRIDE-th of the stages
+ * of a good state is flipped, and every word there overwritten: every step keeps its promises, and all is
  * well again afterwards. Prints how many were tried and how many were found out.
  */
 #include <stdio.h>
@@ -30,6 +30,7 @@ static void step(void)
     measure(&trip, &in);
     memset(&out, 0xff, sizeof out);
     check_promises(&state, &in, &out, mpc_step(&state, &in, &out));
+    restore(&state, &out);
     move(&trip, &out, 1);
 }
 
@@ -156,8 +157,9 @@ int main(int argc, char **argv)
     at_good = trip;
     never_initialised(&random);
     counts();
-    const size_t stages_end = offsetof(mpc_state, origin_soc);
-    for (size_t at = 0; at < sizeof state; at += (at < stages_end) ? stride : 1) {
+    const size_t begin = offsetof(mpc_state, stage);
+    const size_t end = offsetof(mpc_state, origin_soc);
+    for (size_t at = 0; at < sizeof state; at += (at >= begin && at < end) ? stride : 1) {
         overwrite(at, &random);
     }
     printf("%ld tried, %ld found out\n", tried, found_out);

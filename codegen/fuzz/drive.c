@@ -38,14 +38,17 @@ void take_road(drive *of, source *from)
     of->road.steps = (int32_t)steps;
     (void)mpc_forecast_start(&of->forecast, &of->road);
     of->is_wild = (style < 6) ? 0 : 1;
+    of->car.cal = &mpc_par.calibration;
     of->place = 0;
     of->clock_s = 0;
 }
 
 void place_car(drive *of, source *from)
 {
-    const double limits[] = {0, (double)mpc_par.soc_min, (double)mpc_par.soc_max, 1};
-    const double warm[] = {(double)mpc_par.t_cl_min_degc, (double)mpc_par.t_cl_max_degc};
+    const double limits[] = {0, (double)mpc_par.calibration.soc_min,
+                             (double)mpc_par.calibration.soc_max, 1};
+    const double warm[] = {(double)mpc_par.calibration.t_cl_min_degc,
+                           (double)mpc_par.calibration.t_cl_max_degc};
     const double aside = between(from, -1e-3, 1e-3);
     const double soc = below(from, 2) ? between(from, 0, 1) : limits[below(from, 4)] + aside;
     of->car.soc = fmin(fmax(soc, 0), 1);
@@ -53,6 +56,13 @@ void place_car(drive *of, source *from)
                                        : warm[below(from, 2)] + 1e3 * aside;
     of->car.engine_on = 0;
     of->car.engine_for_s = LONGEST_S;
+}
+
+void restore(mpc_state *state, const mpc_out *out)
+{
+    if (out->flags & MPC_BAD_CALIBRATION) {
+        state->calibration = mpc_par.calibration;
+    }
 }
 
 void measure(drive *of, mpc_in *in)

@@ -26,6 +26,9 @@ void take_road(drive *of, source *from);
 /* SOC and coolant anywhere, often at a limit; engine off. */
 void place_car(drive *of, source *from);
 
+/* A calibration tool: writes the car's own page where another was refused. */
+void restore(mpc_state *state, const mpc_out *out);
+
 /* All inputs of the coming second; there must be one: see has_arrived. */
 void measure(drive *of, mpc_in *in);
 

@@ -50,7 +50,8 @@ static double current_a(double soc, double power_w)
 /* Power of the battery: the brakes take braking power beyond what just fills it to its limit. */
 static double battery_w(const second_start *from, double p_eng_w, double cranking_w)
 {
-    const double room_a = fmax((double)mpc_par.soc_max - from->soc, 0) * (double)mpc_par.charge_c;
+    const double room_a = fmax((double)from->cal->soc_max - from->soc, 0)
+                          * (double)mpc_par.charge_c;
     const double filling_w = room_a
                              * (voltage_v(from->soc) + resistance_ohm(from->soc, 0) * room_a);
     const double accepted_w = fmin(filling_w, (double)mpc_par.battery_charge_max_w);
@@ -68,8 +69,9 @@ static double coolant_later_degc(const second_start *from, int engine_on, double
     const double left = (double)mpc_par.fuel_g_per_s[i];
     const double cold = fmax((double)mpc_par.cold_hot_degc - t, 0) / (double)mpc_par.cold_span_k;
     const double alpha = 1 + (double)mpc_par.cold_k * pow(cold, (double)mpc_par.cold_exponent);
-    double fuel = alpha * (left + ((double)mpc_par.fuel_g_per_s[i + 1] - left) * (place - i));
-    fuel += from->engine_on ? 0 : (double)mpc_par.start_fuel_g;
+    double fuel = left + ((double)mpc_par.fuel_g_per_s[i + 1] - left) * (place - i);
+    fuel *= alpha * (double)from->cal->fuel_scale;
+    fuel += from->engine_on ? 0 : (double)from->cal->start_fuel_g;
     const double lost_w = engine_on ? fuel * (double)mpc_par.lhv_j_per_g - p_eng_w : 0;
     const double above_k = t - (double)mpc_par.t_amb_degc;
     const double ua = (double)mpc_par.ua0_w_per_k
@@ -118,9 +120,9 @@ static excess excess_at(const second_start *from, int engine_on, double p_eng_w,
     const excess found = {{
         beyond(p_bat_w, -(double)mpc_par.battery_charge_max_w,
                fmin((double)mpc_par.battery_discharge_max_w, most_w(from->soc))),
-        beyond(soc_later(from, p_bat_w), (double)mpc_par.soc_min, (double)mpc_par.soc_max),
-        beyond(coolant_later_degc(from, engine_on, p_eng_w), (double)mpc_par.t_cl_min_degc,
-               (double)mpc_par.t_cl_max_degc),
+        beyond(soc_later(from, p_bat_w), (double)from->cal->soc_min, (double)from->cal->soc_max),
+        beyond(coolant_later_degc(from, engine_on, p_eng_w), (double)from->cal->t_cl_min_degc,
+               (double)from->cal->t_cl_max_degc),
     }};
     return found;
 }
@@ -146,7 +148,7 @@ excess excess_of(const second_start *from, int engine_on, double p_eng_w)
 double greatest_w(const second_start *from)
 {
     const double before_w = from->engine_on ? from->p_eng_before_w : 0;
-    const double ramped_w = before_w + (double)mpc_par.ramp_w_per_s - (double)POWER_MARGIN_W;
+    const double ramped_w = before_w + (double)from->cal->ramp_w_per_s - (double)POWER_MARGIN_W;
     return clip(ramped_w, (double)mpc_par.engine_min_w, (double)mpc_par.engine_max_w);
 }
 
@@ -187,15 +189,15 @@ int avoidable(const second_start *from, const mpc_out *out, const double *tolera
 static int is_well_inside(const second_start *from, int engine_on, double p_eng_w)
 {
     const double t = coolant_later_degc(from, engine_on, p_eng_w);
-    int inside = t >= (double)mpc_par.t_cl_min_degc + 2 * (double)T_CL_MARGIN_K
-                 && t <= (double)mpc_par.t_cl_max_degc - 2 * (double)T_CL_MARGIN_K;
+    int inside = t >= (double)from->cal->t_cl_min_degc + 2 * (double)T_CL_MARGIN_K
+                 && t <= (double)from->cal->t_cl_max_degc - 2 * (double)T_CL_MARGIN_K;
     for (int cranked = 0; cranked < 2; cranked++) {
         const double p_bat_w = battery_w(from, p_eng_w, cranked ? cranking_w(from, engine_on) : 0);
         const double soc = soc_later(from, p_bat_w);
         inside &= p_bat_w >= -(double)mpc_par.battery_charge_max_w + 2 * (double)POWER_MARGIN_W
                   && p_bat_w <= (double)mpc_par.battery_discharge_max_w - 2 * (double)POWER_MARGIN_W
-                  && soc >= (double)mpc_par.soc_min + 2 * (double)SOC_MARGIN
-                  && soc <= (double)mpc_par.soc_max - 2 * (double)SOC_MARGIN;
+                  && soc >= (double)from->cal->soc_min + 2 * (double)SOC_MARGIN
+                  && soc <= (double)from->cal->soc_max - 2 * (double)SOC_MARGIN;
     }
     return inside;
 }

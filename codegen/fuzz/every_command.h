@@ -12,8 +12,9 @@ typedef struct {
     double demand_w;
     double speed_mps;
     int engine_on;
-    double p_eng_before_w; /* power in the last second */
-    int engine_for_s;      /* since it was started or stopped */
+    double p_eng_before_w;      /* power in the last second */
+    int engine_for_s;           /* since it was started or stopped */
+    const mpc_calibration *cal; /* limits and fuel: the car's own, or those in use */
 } second_start;
 
 /* Excess over the limits of battery power, SOC and coolant, in order of priority; 0 if kept. A start

@@ -149,12 +149,22 @@ static void attack_inputs(source *from)
     from->left -= length;
 }
 
+/* A tool writes a number of the calibration, in its bounds or any. */
+static void calibrate(source *from)
+{
+    const size_t at = below(from, MPC_CAL_ENTRIES);
+    const double least = (double)mpc_par.cal_least[at];
+    const double most = (double)mpc_par.cal_most[at];
+    const mpc_real number = below(from, 4) ? (mpc_real)between(from, least, most) : hostile(from);
+    memcpy((uint8_t *)&state.calibration + (at * sizeof number), &number, sizeof number);
+}
+
 /* One attack; returns for how long its traces may be seen. */
 static int32_t attack(source *from)
 {
     int32_t traces_s = 0;
     mpc_real *const numbers = (mpc_real *)&in;
-    switch (below(from, 16)) {
+    switch (below(from, 17)) {
     case 0: /* one of the measurements */
         numbers[below(from, 4)] = hostile(from);
         traces_s = LONG_S;
@@ -218,6 +228,9 @@ static int32_t attack(source *from)
         poke(from);
         traces_s = LONG_S;
         break;
+    case 15:
+        calibrate(from);
+        break;
     default:
         attack_memory(from);
         break;
@@ -251,6 +264,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             check_promises(&state, &in, &out, mpc_step(&state, &in, &out));
             require(quiet_s < QUIET_S || trip.is_wild || out.flags == 0, "all was well, and a flag",
                     &state, &out);
+            restore(&state, &out);
             count();
             move(&trip, &out, 1);
         }

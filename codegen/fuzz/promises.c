@@ -59,6 +59,15 @@ static int is_as_given(const mpc_measured *used, const mpc_in *in)
            && used->engine_on == in->engine_on;
 }
 
+/* The calibration is taken over as a whole, or one of its entries is refused. */
+static int is_calibrated(const mpc_state *state, const mpc_out *out)
+{
+    const int is_used = memcmp(&state->cal, &state->calibration, sizeof state->cal) == 0;
+    const int is_named = out->wrong_entry >= 0 && out->wrong_entry < MPC_CAL_ENTRIES;
+    const int is_refused = (out->flags & MPC_BAD_CALIBRATION) != 0;
+    return is_refused ? is_named : (is_used && out->wrong_entry == -1);
+}
+
 void check_promises(const mpc_state *state, const mpc_in *in, const mpc_out *out, int32_t returned)
 {
     static const char *const names[] = {"avoidable: power", "avoidable: SOC", "avoidable: coolant"};
@@ -66,11 +75,12 @@ void check_promises(const mpc_state *state, const mpc_in *in, const mpc_out *out
     const second_start told = {(double)used->soc,      (double)used->t_cl_degc,
                                (double)used->demand_w, (double)used->speed_mps,
                                used->engine_on,        (double)used->p_eng_before_w,
-                               used->engine_for_s};
+                               used->engine_for_s,     &state->cal};
     require(out->flags == returned && is_declared(out), "undeclared status", state, out);
     require(is_in_range(&told, out), "command out of range", state, out);
     require((out->flags & MPC_BAD_MEASUREMENT) || is_as_given(used, in),
             "a measurement replaced without a flag", state, out);
+    require(is_calibrated(state, out), "a calibration neither used nor refused", state, out);
     const int limit = avoidable(&told, out, tolerance);
     require(limit < 0, names[(limit < 0) ? 0 : limit], state, out);
     require(!cut_short(&told, out), "a run or rest cut short", state, out);

@@ -4,13 +4,13 @@
 
 #include "mpc.h"
 
-#define FLAGS 6 /* bits of mpc_out.flags */
+#define FLAGS 7 /* bits of mpc_out.flags */
 
 /* Abort with a message and the state's measurements unless `fine`. */
 void require(int fine, const char *what, const mpc_state *state, const mpc_out *out);
 
-/* Command in range, status declared and consistent, measurements used as given unless flagged, and
- * no other command exceeds the limits of the second by less, for the measurements used. */
+/* Command in range, status declared and consistent, measurements and calibration used as given unless
+ * flagged, and no other command exceeds the limits of the second by less, for those used. */
 void check_promises(const mpc_state *state, const mpc_in *in, const mpc_out *out, int32_t returned);
 
 #endif

@@ -2,6 +2,7 @@
 
 import ast
 import inspect
+import re
 import textwrap
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -25,11 +26,16 @@ class Writer:
 
     Parameters
     ----------
-    names, functions : variables and functions in C
+    names, functions : variables and functions in C; those of the calibration are members of `cal`
+
+    Attributes
+    ----------
+    calibrated : functions that need the calibration, their first argument in C
     """
 
     def __init__(self, names: dict[str, str], functions: dict[str, str]) -> None:
         self.names, self._functions = dict(names), functions
+        self.calibrated: set[str] = set()
 
     def expression(self, node: ast.expr) -> str:
         """Write an expression; a product or sum inside another is in parentheses.
@@ -57,6 +63,7 @@ class Writer:
                 return f"{test} ? {parts[0]} : {parts[1]}"
             case ast.Call(func=ast.Name(id=name), args=arguments) if name in self._functions:
                 texts = [self.expression(a) for a in arguments if not _is_parameter_set(a)]
+                texts[:0] = ["cal"] if name in self.calibrated else []
                 return f"{self._functions[name]}({', '.join(texts)})"
         raise FormulaError(f"C has no {ast.unparse(node)!r}")
 
@@ -102,6 +109,7 @@ class Writer:
         inner = type(self)(
             self.names | {argument: argument for argument in arguments}, self._functions
         )
+        inner.calibrated = self.calibrated
         lines, kind, before = inner.lines(body), "mpc_real", ""
         if isinstance(value, ast.Tuple):
             parts = [part.id for part in value.elts if isinstance(part, ast.Name)]
@@ -110,7 +118,11 @@ class Writer:
             lines += [f"const {kind} result = {{{', '.join(parts)}}};", "return result;"]
         else:
             lines.append(f"return {inner.expression(value)};")
-        signature = ", ".join(f"mpc_real {argument}" for argument in arguments) or "void"
+        given_in_c = [f"mpc_real {argument}" for argument in arguments]
+        if any(re.search(r"\bcal\b", line) for line in lines):
+            given_in_c.insert(0, "const mpc_calibration *cal")
+            self.calibrated.add(name)
+        signature = ", ".join(given_in_c) or "void"
         start = f"{before}static inline {kind} {self._functions[name]}({signature})\n"
         return f"{start}{{\n{_body(lines)}\n}}\n"
 

@@ -7,6 +7,7 @@ from functools import lru_cache
 from qpmpc.codegen.rows.c_text import ArithmeticWriter
 from qpmpc.codegen.rows.stage_c import (
     FUNCTIONS,
+    Places,
     function,
     header,
     heat_h,
@@ -15,6 +16,7 @@ from qpmpc.codegen.rows.stage_c import (
     road_types,
     struct,
     variable,
+    with_heat,
 )
 from qpmpc.costate.program import MADE, PROGRAM, TAKEN
 from qpmpc.qp import rows
@@ -22,16 +24,17 @@ from qpmpc.qp.expressions import names_in, parsed, targets_of
 from qpmpc.qp.rows import Table
 
 MULTIPLIERS = ("CHARGE", "HEAT")
+OF_FUEL = ("fuel_cost", "per_fuel")
 OF_START = "start_k"  # a number that is there only where starts cost something
 
 
 @lru_cache(maxsize=8)
-def costate_files(table: Table, scalars: tuple[str, ...]) -> dict[str, str]:
+def costate_files(table: Table, places: Places) -> dict[str, str]:
     """Return the headers that are made from the table, by name; not to be changed."""
     return {
-        "mpc_heat.h": heat_h(scalars, ArithmeticWriter),
+        "mpc_heat.h": heat_h(places, ArithmeticWriter),
         "mpc_rows.h": _types(table),
-        "mpc_costate_values.h": _values(table, scalars),
+        "mpc_costate_values.h": _values(table, places),
     }
 
 
@@ -65,28 +68,34 @@ def _needed(wanted: Iterable[str]) -> list[ast.stmt]:
     return kept[::-1]
 
 
-def _values(table: Table, scalars: tuple[str, ...]) -> str:
+def _scaled(name: str, value: str) -> str:
+    """Return a number of a stage; what fuel costs and what heat it gives with its factor."""
+    return f"cal->fuel_scale * {value}" if name in OF_FUEL else value
+
+
+def _values(table: Table, places: Places) -> str:
     members = _members(table)
     own = [line for line in parsed(PROGRAM) if targets_of(line)[0] in members]
     wanted = {name for line in own for name in names_in(line)} | set(TAKEN)
-    writer = ArithmeticWriter(names_of_values(scalars), FUNCTIONS)
+    writer = with_heat(ArithmeticWriter(names_of_values(places), FUNCTIONS), places)
     needed = _needed(wanted)
     lines = writer.lines(needed)
     if any("is_last" in names_in(line) for line in needed):
         last = "const mpc_real is_last = (k == (MPC_STAGES - 1)) ? REAL(1.0) : REAL(0.0);"
         lines.insert(0, last)
-    lines += [f"of->{name} = {writer.names[name]};" for name in TAKEN]
+    lines += [f"of->{name} = {_scaled(name, writer.names[name])};" for name in TAKEN]
     for line in own:
         (target,) = targets_of(line)
         assert isinstance(line, ast.Assign)
-        lines.append(f"of->{target} = {writer.expression(line.value)};")
+        lines.append(f"of->{target} = {_scaled(target, writer.inner(line.value))};")
         writer.names[target] = f"of->{target}"
     return header(
         "mpc_costate_values.h",
         "Numbers of a stage's program.",
         ["mpc_constants.h", "mpc_heat.h", "mpc_model.h", "mpc_parts.h", "mpc_real.h"],
         function(
-            "void costate_fill(mpc_state *state, int32_t k, mpc_stage_sums *sums)",
+            "void costate_fill(mpc_state *state, const mpc_calibration *cal, int32_t k, "
+            "mpc_stage_sums *sums)",
             "Numbers of stage k. The first stage starts at the origin.",
             [
                 "const mpc_stage_road *const road = &state->stage[k].road;",

@@ -10,6 +10,7 @@ from qpmpc.codegen.rows.elimination import (
     weight,
 )
 from qpmpc.codegen.rows.stage_c import (
+    Places,
     bounds,
     function,
     header,
@@ -29,22 +30,20 @@ MATRIX = "const mpc_stage_matrix *const a = &stage->a;"
 
 
 @lru_cache(maxsize=8)
-def rows_files(
-    table: Table, scalars: tuple[str, ...], algorithm: str, learning: bool
-) -> dict[str, str]:
+def rows_files(table: Table, places: Places, algorithm: str, learning: bool) -> dict[str, str]:
     """Return the headers that are made from the table of rows, by name; not to be changed.
 
     Parameters
     ----------
     table : of the vehicle
-    scalars : names of the controller's parameters
+    places : of the controller's parameters
     algorithm : `admm` or `osqp`
     learning : whether the fuel curve is in the state
     """
     files = {
-        "mpc_heat.h": heat_h(scalars),
+        "mpc_heat.h": heat_h(places),
         "mpc_rows.h": types_h(table),
-        "mpc_rows_values.h": values_h(table, scalars, learning),
+        "mpc_rows_values.h": values_h(table, places, learning),
     }
     if algorithm == "osqp":
         return files | {"mpc_rows_osqp.h": osqp_h(table)}

@@ -11,6 +11,7 @@ from qpmpc.qp.quantities import ABOUT, FLOOR, INPUTS, LEARNED, ORIGIN, STAGE
 from qpmpc.qp.rows import VARIABLES, Entry, Row, Table, Var
 from qpmpc.vehicle import heat
 
+Places = tuple[tuple[str, str], ...]  # names of parameters, and in C
 PIECES = ("fuel_slope", "fuel_intercept", "battery_slope", "battery_intercept")
 LEARNED_PLACES = dict(
     zip(LEARNED, ("slope[i]", "intercept[i]", "idle_g_per_s", "chord_g_per_j"), strict=True)
@@ -181,9 +182,9 @@ def _running() -> list[str]:
     ]
 
 
-def values_h(table: Table, scalars: Iterable[str], learning: bool) -> str:
+def values_h(table: Table, places: Places, learning: bool) -> str:
     """Return `mpc_rows_values.h`: entries, bounds, scaling and cost of a stage."""
-    names = names_of_values(scalars)
+    names = names_of_values(places)
     if learning:
         names |= {name: f"state->learned.{place}" for name, place in LEARNED_PLACES.items()}
     return header(
@@ -191,14 +192,21 @@ def values_h(table: Table, scalars: Iterable[str], learning: bool) -> str:
         "Values of a stage's rows, scaled to unit norm, and its weights in the cost.",
         ["mpc_constants.h", "mpc_heat.h", "mpc_model.h", "mpc_parts.h", "mpc_real.h"],
         _scale(table),
-        _fill(table, Writer(names, FUNCTIONS)),
+        _fill(table, with_heat(Writer(names, FUNCTIONS), places)),
     )
 
 
-def names_of_values(scalars: Iterable[str]) -> dict[str, str]:
+def places_of(scalars: Iterable[str], tuned: Iterable[str]) -> Places:
+    """Return the places of a controller's parameters: constants, or members of its calibration."""
+    constants = [(name, f"mpc_par.{name}") for name in scalars]
+    return (*constants, *((name, f"cal->{name}") for name in tuned))
+
+
+def names_of_values(places: Places) -> dict[str, str]:
     """Names in C of what the table's quantities are made of."""
-    names = {name: f"mpc_par.{name}" for name in scalars}
-    names |= {name: f"mpc_par.{name}[i]" for name in PIECES}
+    names = dict(places) | {name: f"mpc_par.{name}[i]" for name in PIECES}
+    scaled = set(LEARNED_PLACES) & set(names)
+    names |= {name: f"(cal->fuel_scale * {names[name]})" for name in scaled}
     names |= {name: f"road->{name}" for name in INPUTS}
     names |= {name: f"state->{name}" for name in (*ORIGIN, FLOOR[1])}
     names |= {name: name for name, value in vars(rows).items() if isinstance(value, float)}
@@ -241,6 +249,7 @@ def _fill(table: Table, writer: Writer) -> str:
             "mpc_stage_matrix *const a = &stage->a;",
             "mpc_stage_bounds *const b = &stage->b;",
             "const mpc_real *const column = stage->column;",
+            "const mpc_calibration *const cal = &state->cal;",
             *lines,
         ],
     )
@@ -273,9 +282,18 @@ def _fill_row(row: Row, writer: Writer) -> list[str]:
     return lines
 
 
-def heat_h(scalars: Iterable[str], kind: type[Writer] = Writer) -> str:
+def with_heat(writer: Writer, places: Places) -> Writer:
+    """Let a writer know which functions of the heat need the calibration."""
+    of_heat = Writer(dict(places), FUNCTIONS)
+    for formula in FORMULAS:
+        of_heat.function(formula)
+    writer.calibrated = of_heat.calibrated
+    return writer
+
+
+def heat_h(places: Places, kind: type[Writer] = Writer) -> str:
     """Return `mpc_heat.h`: heat that leaves the coolant, as in the plant."""
-    writer = kind({name: f"mpc_par.{name}" for name in scalars}, FUNCTIONS)
+    writer = kind(dict(places), FUNCTIONS)
     functions = [writer.function(formula) for formula in FORMULAS]
     what = "Heat that leaves the coolant, and its temperature: qpmpc.vehicle.heat, qp.coolant."
     return header("mpc_heat.h", what, ["mpc_model.h", "mpc_real.h"], *functions)

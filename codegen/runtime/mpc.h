@@ -75,14 +75,15 @@ enum {
     MPC_RULES = 2         /* rules that need no plan */
 };
 
-/* What was wrong in a second: bits of mpc_out.flags. The first two alone cost no plan. */
+/* What was wrong in a second: bits of mpc_out.flags. The first two and the last alone cost no plan. */
 enum {
     MPC_BAD_MEASUREMENT = 1, /* the model's prediction from the last good one is used */
     MPC_BAD_PREVIEW = 2,     /* the last good one is used as long as it reaches */
     MPC_SOLVER_FAILED = 4,   /* no usable solution */
     MPC_WARMING_UP = 8,      /* the solver has not converged yet since a cold start */
     MPC_BAD_CLOCK = 16, /* a second again, or one that cannot be: then seconds are counted on */
-    MPC_BAD_STATE = 32  /* memory was not initialised, or was corrupted; it is initialised */
+    MPC_BAD_STATE = 32, /* memory was not initialised, or was corrupted; it is initialised */
+    MPC_BAD_CALIBRATION = 64 /* state->calibration is refused; the last good one is in use */
 };
 
 typedef struct {
@@ -96,10 +97,17 @@ typedef struct {
     int32_t engine_on; /* 0 or 1 */
     int32_t rung;
     int32_t flags;
-    int32_t iterations; /* of the solver in this call */
+    int32_t iterations;  /* of the solver in this call */
+    int32_t wrong_entry; /* of a calibration that is refused, MPC_CAL_...: out of its bounds or, of
+                            two that contradict each other, the lower one; else -1 */
 } mpc_out;
 
-/* Set a defined state: no plan, cold solver, rules reset. */
+/* Set a defined state: no plan, cold solver, rules reset, the calibration that was generated.
+ *
+ * state->calibration, see mpc_calibration.h, may be written at any time, by a calibration tool too,
+ * with numbers of the precision of mpc_real. Each second it is taken over as a whole if every entry
+ * lies in its bounds and no two contradict each other; if not, that is flagged and the one before
+ * stays in use. */
 void mpc_init(mpc_state *state);
 
 /* Do one slice of the departure: a cold solve, linearised MPC_DEPARTURE_LINEARISATIONS times.
@@ -119,9 +127,10 @@ void mpc_plan(const mpc_state *state, mpc_real *x, mpc_real *duals);
 
 /* Layout of this build, for callers in other languages to check theirs: version of this
  * interface, sizeof mpc_real, mpc_in, mpc_out, mpc_state, then MPC_SHORT, MPC_LONG, MPC_VARS,
- * MPC_ROWS, MPC_ITERATIONS, offset of mpc_in.short_count, of mpc_out.engine_on. */
-#define MPC_ABI_VERSION 7
-#define MPC_ABI_ENTRIES 12
+ * MPC_ROWS, MPC_ITERATIONS, offset of mpc_in.short_count, of mpc_out.engine_on, of
+ * mpc_state.calibration, MPC_CAL_ENTRIES. */
+#define MPC_ABI_VERSION 8
+#define MPC_ABI_ENTRIES 14
 int32_t mpc_abi(int32_t entry);
 
 #ifdef __cplusplus

@@ -39,6 +39,7 @@ int32_t mpc_check_state(const mpc_state *state)
     fine &= is_count(state->depart_linearisation, MPC_DEPARTURE_LINEARISATIONS);
     fine &= is_count(state->depart_left, MPC_DEPARTURE_ITERATIONS);
     fine &= mpc_method_check(state);
+    fine &= mpc_calibration_check(&state->cal);
     fine &= is_count(rules->power_request, 1) & is_count(rules->heat_request, 1);
     fine &= is_count(watch->soc_since_s, LONG_AGO_S) & is_count(watch->t_cl_since_s, LONG_AGO_S);
     fine &= is_count(watch->has_clock, 1) & is_count(watch->command_on, 1);
@@ -72,12 +73,13 @@ static int32_t elapsed_s(mpc_watch *watch, int32_t second, int32_t *flags)
 }
 
 /* SOC and coolant temperature that a second of the last command led to. */
-static void predict(const mpc_watch *watch, mpc_real *soc, mpc_real *t_cl_degc)
+static void predict(const mpc_watch *watch, const mpc_calibration *cal, mpc_real *soc,
+                    mpc_real *t_cl_degc)
 {
     const mpc_measured *const good = &watch->good;
-    const mpc_real accepted_w = mpc_map_charge_limit_w(good->soc);
+    const mpc_real accepted_w = mpc_map_charge_limit_w(good->soc, cal->soc_max);
     const int32_t starts = ((watch->command_on != 0) && (good->engine_on == 0)) ? 1 : 0;
-    const mpc_real start_g = (starts != 0) ? mpc_par.start_fuel_g : REAL(0.0);
+    const mpc_real start_g = (starts != 0) ? cal->start_fuel_g : REAL(0.0);
     const mpc_real cranking_w = (starts != 0) ? mpc_par.start_energy_j : REAL(0.0);
     const mpc_real aux_w = mpc_par.aux_power_w + cranking_w;
     mpc_real p_bat_w = (good->demand_w + aux_w) - watch->command_w;
@@ -86,7 +88,7 @@ static void predict(const mpc_watch *watch, mpc_real *soc, mpc_real *t_cl_degc)
         p_bat_w = real_min(-accepted_w, aux_w - watch->command_w);
     }
     const mpc_real current_a = mpc_map_current_a(good->soc, p_bat_w);
-    const mpc_real hot_g_per_s = mpc_map_fuel_g_per_s(watch->command_w);
+    const mpc_real hot_g_per_s = cal->fuel_scale * mpc_map_fuel_g_per_s(watch->command_w);
     const mpc_real fuel_g = (mpc_map_cold_factor(good->t_cl_degc) * hot_g_per_s) + start_g;
     const mpc_real fuel_w = fuel_g * mpc_par.lhv_j_per_g;
     const mpc_real engine_w = heat_engine_w(fuel_w, watch->command_w);
@@ -137,7 +139,8 @@ static void know_engine(mpc_watch *watch, int32_t was_on, int32_t is_first, int3
     }
 }
 
-int32_t mpc_check_measured(mpc_watch *watch, const mpc_in *in, int32_t *elapsed)
+int32_t mpc_check_measured(mpc_watch *watch, const mpc_calibration *cal, const mpc_in *in,
+                           int32_t *elapsed)
 {
     mpc_measured *const good = &watch->good;
     const int32_t was_on = good->engine_on;
@@ -150,7 +153,7 @@ int32_t mpc_check_measured(mpc_watch *watch, const mpc_in *in, int32_t *elapsed)
     watch->has_clock = 1;
     watch->soc_since_s = later(watch->soc_since_s, passed);
     watch->t_cl_since_s = later(watch->t_cl_since_s, passed);
-    predict(watch, &soc, &t_cl_degc); /* always: it takes time */
+    predict(watch, cal, &soc, &t_cl_degc); /* always: it takes time */
     soc = (passed > 0) ? soc : good->soc;
     t_cl_degc = (passed > 0) ? t_cl_degc : good->t_cl_degc;
     /* a value out of range is beyond any reach */

@@ -34,14 +34,15 @@ static inline void put_charge(mpc_costate_term *term, const mpc_stage *first, in
     term->price = MPC_NO_PRICE;
 }
 
-static inline mpc_real charge_of(const mpc_costate_term *term)
+static inline mpc_real charge_of(const mpc_costate_term *term, mpc_real most_g)
 {
-    return real_clip(term->price, REAL(0.0), mpc_par.most_charge_g);
+    return real_clip(term->price, REAL(0.0), most_g);
 }
 
 static void aim_charge(mpc_state *state)
 {
     const int32_t which = state->search.here;
+    const mpc_real most_g = state->cal.fuel_scale * mpc_par.most_charge_g;
     mpc_costate_term *const term = state->search.term;
     mpc_stage *const stage = state->stage;
     for (int32_t k = 0; k < MPC_SHORT; k++) {
@@ -53,11 +54,11 @@ static void aim_charge(mpc_state *state)
     }
     mpc_costate_funnel(&state->search, SOC_TERMS, (CHARGE_HALF_STEPS * SOC_TERMS) / 2);
     for (int32_t k = 0; k < MPC_SHORT; k++) {
-        stage[k].goal_charge = charge_of(&term[k]);
+        stage[k].goal_charge = charge_of(&term[k], most_g);
     }
     for (int32_t i = 0; i < MPC_BLOCKS; i++) {
         const int32_t first = MPC_SHORT + (MPC_CLASSES * i);
-        const mpc_real price = charge_of(&term[MPC_SHORT + i]);
+        const mpc_real price = charge_of(&term[MPC_SHORT + i], most_g);
         for (int32_t j = 0; j < MPC_CLASSES; j++) {
             stage[first + j].goal_charge = price;
         }
@@ -68,7 +69,7 @@ static void aim_heat(mpc_state *state)
 {
     const int32_t which = state->search.here;
     mpc_costate_term *const term = state->search.term;
-    const mpc_real slack = mpc_par.slack_g_per_k;
+    const mpc_real slack = state->cal.slack_g_per_k;
     const mpc_real most = AT_SLACK * slack;
     mpc_real change = REAL(0.0); /* M of the limits given up less that of the multipliers now */
     for (int32_t k = MPC_STAGES - 1; k >= 0; k--) {
@@ -100,7 +101,7 @@ static void go_towards(mpc_state *state, int32_t tried)
 {
     const mpc_costate_term *const term = state->search.term;
     const mpc_real share = state->search.share;
-    const mpc_real slack = mpc_par.slack_g_per_k;
+    const mpc_real slack = state->cal.slack_g_per_k;
     mpc_real after = REAL(0.0); /* price of the next stage, times its decay */
     for (int32_t k = MPC_STAGES - 1; k >= 0; k--) {
         mpc_stage *const stage = &state->stage[k];

@@ -22,7 +22,7 @@ static mpc_real price_coolant(mpc_state *state, int32_t which)
         dual->nu = ((dual->heat - p->price_t) - after) * p->per_end;
         dual->off_g = dual->charge * p->off_charge;
 #if MPC_STARTS
-        dual->start_g = (mpc_par.start_fuel_g + (dual->charge * mpc_par.cranking_soc))
+        dual->start_g = (state->cal.start_fuel_g + (dual->charge * mpc_par.cranking_soc))
                         - (dual->nu * p->of.start_k);
 #endif
         after = p->of.t_before * dual->nu;

@@ -49,7 +49,7 @@ static mpc_real follow(mpc_state *state, mpc_real soc_price)
         const mpc_real starts = real_max(stage->p.rises * (share - before), REAL(0.0));
         heat += of->start_k * starts;
         spent += mpc_par.cranking_soc * starts;
-        cost += mpc_par.start_fuel_g * starts;
+        cost += state->cal.start_fuel_g * starts;
         stage->x[MPC_VAR_START] = starts;
         before = share;
 #endif
@@ -58,13 +58,13 @@ static mpc_real follow(mpc_state *state, mpc_real soc_price)
         const mpc_real beyond_k = real_max(of->t_low - t_cl_k, REAL(0.0))
                                   + real_max(t_cl_k - of->t_high, REAL(0.0));
         cost += (of->fuel_cost * fuel) + (stage->p.price_t * t_cl_k);
-        cost += mpc_par.slack_g_per_k * beyond_k;
+        cost += state->cal.slack_g_per_k * beyond_k;
         cost += soc_price * real_max(of->soc_low - soc, REAL(0.0));
         stage->x[MPC_VAR_ON] = chosen + forced;
         stage->x[MPC_VAR_SOC] = soc;
         stage->x[MPC_VAR_T_CL] = t_cl_k;
         stage->x[MPC_VAR_P_ENG] = power;
-        stage->x[MPC_VAR_FUEL] = fuel;
+        stage->x[MPC_VAR_FUEL] = state->cal.fuel_scale * fuel;
         stage->x[MPC_VAR_INTERNAL] = internal;
         stage->x[MPC_VAR_T_SLACK] = REAL(0.0);
         stage->y[MPC_ROW_CHARGE] = dual->charge;

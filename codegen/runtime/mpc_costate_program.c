@@ -5,14 +5,6 @@
 #include "mpc_model.h"
 #include "mpc_real.h"
 
-#if MPC_STARTS
-#define SECOND START_SWITCH_G_PER_S
-#define LONGER START_LONG_SWITCH_G_PER_S
-#else
-#define SECOND SWITCH_G_PER_S
-#define LONGER LONG_SWITCH_G_PER_S
-#endif
-
 static void put_part(mpc_costate_part *part, mpc_real net_w, mpc_real low_w, mpc_real high_w)
 {
     part->net_w = net_w;
@@ -37,6 +29,7 @@ static void put_no_part(mpc_stage *stage)
 
 void mpc_costate_program_fill(mpc_state *state)
 {
+    const mpc_calibration cal = state->cal; /* a copy, which nothing else can change */
     mpc_stage_sums sums = {REAL(0.0)};
 #if MPC_STARTS
     mpc_real free_before = REAL(1.0);
@@ -44,7 +37,7 @@ void mpc_costate_program_fill(mpc_state *state)
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         mpc_costate_program *const p = &state->stage[k].p;
         const mpc_stage_road *const road = &state->stage[k].road;
-        costate_fill(state, k, &sums);
+        costate_fill(state, &cal, k, &sums);
         p->price_t = p->of.growing;
         if (k > 0) {
             state->stage[k - 1].p.price_t += p->of.growing;
@@ -69,7 +62,8 @@ void mpc_costate_program_fill(mpc_state *state)
             put_part(&p->part[MPC_FORCED], p->of.forced_net_w, p->of.forced_low_w,
                      p->of.forced_high_w);
         }
-        const mpc_real per_s = pick((road->duration_s > REAL(1.0)) ? 1 : 0, LONGER, SECOND);
+        const mpc_real per_s = pick((road->duration_s > REAL(1.0)) ? 1 : 0,
+                                    cal.search_long_switch_g_per_s, cal.search_switch_g_per_s);
         p->width = real_max(per_s * road->duration_s * free, LEAST_SWITCH_G);
         p->per_width = REAL(1.0) / p->width;
         const mpc_real background = BACKGROUND * p->per_width;

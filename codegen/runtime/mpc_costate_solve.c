@@ -26,7 +26,7 @@ void mpc_method_start(mpc_state *state)
     mpc_costate_program_fill(state);
     search->here = 0;
     search->streak = 0;
-    search->share = FIRST_SHARE;
+    search->share = state->cal.search_first_share;
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         mpc_stage *const stage = &state->stage[k];
         stage->dual[0].charge = stage->y[MPC_ROW_CHARGE];
@@ -43,7 +43,7 @@ int32_t mpc_method_iterate(mpc_state *state, int32_t count)
         mpc_costate_try(state, tried);
         mpc_costate_dual_at(state, tried);
         const mpc_real rise = search->value[tried] - search->value[search->here];
-        const int32_t rises = (rise > LEAST_RISE_G) ? 1 : 0;
+        const int32_t rises = (rise > state->cal.search_least_rise_g) ? 1 : 0;
         const int32_t streak = (search->streak < STREAK) ? (search->streak + 1) : STREAK;
         const int32_t grows = ((streak >= STREAK) || (search->share < REAL(1.0))) ? 1 : 0;
         const mpc_real grown = real_min(GROWS * search->share, MOST_SHARE);

@@ -26,10 +26,12 @@ static mpc_real largest_gain_k(const mpc_stage_road *road, mpc_real room, mpc_re
 
 void mpc_floor_find(mpc_state *state, mpc_real soc)
 {
+    const mpc_calibration *const cal = &state->cal;
     mpc_real gain_k[MPC_STAGES];
-    const mpc_real factor = mpc_map_cold_factor(mpc_par.t_cl_min_degc) * mpc_par.lhv_j_per_g;
-    const mpc_real widest = mpc_par.soc_max - mpc_par.soc_min;
-    mpc_real room = mpc_par.soc_max - real_clip(soc, mpc_par.soc_min, mpc_par.soc_max);
+    const mpc_real factor = (mpc_map_cold_factor(cal->t_cl_min_degc) * mpc_par.lhv_j_per_g)
+                            * cal->fuel_scale;
+    const mpc_real widest = cal->soc_max - cal->soc_min;
+    mpc_real room = cal->soc_max - real_clip(soc, cal->soc_min, cal->soc_max);
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         const mpc_stage_road *const road = &state->stage[k].road;
         gain_k[k] = largest_gain_k(road, room, factor);
@@ -37,8 +39,8 @@ void mpc_floor_find(mpc_state *state, mpc_real soc)
         room = real_clip(room, REAL(0.0), widest);
     }
     const mpc_real most =
-        real_max(REAL(0.5) * (mpc_par.t_cl_min_degc + mpc_par.t_cl_max_degc), mpc_par.t_min_degc);
-    mpc_real floor_degc = mpc_par.t_min_degc;
+        real_max(REAL(0.5) * (cal->t_cl_min_degc + cal->t_cl_max_degc), cal->t_min_degc);
+    mpc_real floor_degc = cal->t_min_degc;
     state->highest_floor_degc = floor_degc;
     for (int32_t k = MPC_STAGES - 1; k >= 0; k--) {
         mpc_stage_road *const road = &state->stage[k].road;
@@ -46,6 +48,6 @@ void mpc_floor_find(mpc_state *state, mpc_real soc)
         state->highest_floor_degc = real_max(state->highest_floor_degc, floor_degc);
         const mpc_real lost_k = (road->duration_s * heat_cooling_w(floor_degc, road->speed_mps))
                                 / mpc_par.heat_capacity_j_per_k;
-        floor_degc = real_clip((floor_degc + lost_k) - gain_k[k], mpc_par.t_min_degc, most);
+        floor_degc = real_clip((floor_degc + lost_k) - gain_k[k], cal->t_min_degc, most);
     }
 }

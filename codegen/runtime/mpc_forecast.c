@@ -132,7 +132,7 @@ static mpc_swing swing_of(const mpc_forecast *forecast, int32_t first)
 /* Energy that is kept from an SOC limit at most. */
 static mpc_real most_kept_j(void)
 {
-    const mpc_real room = mpc_par.soc_max - mpc_par.soc_min;
+    const mpc_real room = mpc_par.calibration.soc_max - mpc_par.calibration.soc_min;
     return FILLED_SHARE * room * mpc_par.battery_energy_j;
 }
 

@@ -105,7 +105,7 @@ void mpc_learned_take(mpc_state *state)
         mpc_real start = REAL(0.0);
         if (is_on != 0) {
             share = map_g / rated_g;
-            start = (good->engine_for_s == 1) ? (mpc_par.start_fuel_g / rated_g) : REAL(0.0);
+            start = (good->engine_for_s == 1) ? (state->cal.start_fuel_g / rated_g) : REAL(0.0);
         }
         of->left_s = (is_on != 0) ? MPC_LATE : (of->left_s - 1);
         if ((is_on != 0) && (p_eng_w >= mpc_par.engine_max_w)) {

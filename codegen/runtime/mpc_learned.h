@@ -18,8 +18,8 @@ void mpc_learned_curve(mpc_state *state);
 /* Whether the memory is one that mpc_learned_take can leave. */
 int32_t mpc_learned_check(const mpc_state *state);
 #elif !MPC_COSTATE
-#define FUEL_SLOPE(i) (mpc_par.fuel_slope[i])
-#define FUEL_INTERCEPT(i) (mpc_par.fuel_intercept[i])
+#define FUEL_SLOPE(i) (state->cal.fuel_scale * mpc_par.fuel_slope[i])
+#define FUEL_INTERCEPT(i) (state->cal.fuel_scale * mpc_par.fuel_intercept[i])
 #else
 /* another curve */
 #endif

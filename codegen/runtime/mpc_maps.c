@@ -3,7 +3,8 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-/* Fuel of the hot engine on its optimal line, engine on: linear between grid points. */
+/* Fuel of the hot engine on its optimal line, engine on, before the factor of the calibration:
+ * linear between grid points. */
 mpc_real mpc_map_fuel_g_per_s(mpc_real p_eng_w)
 {
     const mpc_real place = real_clip(p_eng_w, REAL(0.0), mpc_par.engine_max_w)
@@ -51,9 +52,9 @@ mpc_real mpc_map_power_to_reach_w(mpc_real soc, mpc_real soc_end)
 }
 
 /* Most power that the battery accepts: its limit, or what just fills it to soc_max in a second. */
-mpc_real mpc_map_charge_limit_w(mpc_real soc)
+mpc_real mpc_map_charge_limit_w(mpc_real soc, mpc_real soc_max)
 {
-    const mpc_real filling_w = -mpc_map_power_to_reach_w(soc, mpc_par.soc_max);
+    const mpc_real filling_w = -mpc_map_power_to_reach_w(soc, soc_max);
     return real_min(mpc_par.battery_charge_max_w, real_max(filling_w, REAL(0.0)));
 }
 

@@ -12,7 +12,7 @@ typedef struct {
 /* mpc_maps.c: maps of engine and battery */
 mpc_real mpc_map_fuel_g_per_s(mpc_real p_eng_w);
 mpc_real mpc_map_cold_factor(mpc_real t_cl_degc);
-mpc_real mpc_map_charge_limit_w(mpc_real soc);
+mpc_real mpc_map_charge_limit_w(mpc_real soc, mpc_real soc_max);
 mpc_real mpc_map_power_to_reach_w(mpc_real soc, mpc_real soc_end);
 mpc_real mpc_map_current_a(mpc_real soc, mpc_real power_w);
 mpc_real mpc_map_planned_internal_w(mpc_real power_w);
@@ -71,11 +71,19 @@ void mpc_solver_claim(const mpc_state *state);
 void mpc_solver_start(mpc_state *state);
 int32_t mpc_solver_iterate(mpc_state *state, int32_t count);
 
+/* mpc_calibration.c. mpc_calibration_take: takes over the one from outside; returns the entry that is
+ * wrong, -1 if none. mpc_calibration_check: whether the one in use is sound. */
+int32_t mpc_calibration_take(mpc_state *state);
+int32_t mpc_calibration_check(const mpc_calibration *cal);
+
 /* mpc_safety.c, mpc_rules.c, mpc_check.c */
-mpc_command mpc_safety_admissible(mpc_command wish, const mpc_measured *seen);
-mpc_command mpc_rules_decide(mpc_rule_memory *memory, const mpc_measured *seen);
+mpc_command mpc_safety_admissible(mpc_command wish, const mpc_measured *seen,
+                                  const mpc_calibration *cal);
+mpc_command mpc_rules_decide(mpc_rule_memory *memory, const mpc_measured *seen,
+                             const mpc_calibration *cal);
 int32_t mpc_check_state(const mpc_state *state);
-int32_t mpc_check_measured(mpc_watch *watch, const mpc_in *in, int32_t *elapsed);
+int32_t mpc_check_measured(mpc_watch *watch, const mpc_calibration *cal, const mpc_in *in,
+                           int32_t *elapsed);
 int32_t mpc_check_second(mpc_real demand_w, mpc_real speed_mps);
 
 /* mpc_preview.c */

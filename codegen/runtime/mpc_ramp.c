@@ -10,14 +10,15 @@
 
 mpc_real mpc_ramp_least_w(const mpc_state *state)
 {
+    const mpc_calibration *const cal = &state->cal;
     const mpc_real soc = state->watch.good.soc;
-    const mpc_real to_spare = real_max(soc - (mpc_par.soc_min + SOC_KEPT), REAL(0.0));
+    const mpc_real to_spare = real_max(soc - (cal->soc_min + SOC_KEPT), REAL(0.0));
     mpc_real total_w = state->stage[0].road.net_w;
     mpc_real least_w = REAL(0.0);
     for (int32_t k = 1; k < MPC_SHORT; k++) {
         const mpc_stage_road *const road = &state->stage[k].road;
         const mpc_real seconds = (mpc_real)k + REAL(1.0);
-        const mpc_real risen_w = (mpc_par.ramp_w_per_s - POWER_MARGIN_W) * (mpc_real)k;
+        const mpc_real risen_w = (cal->ramp_w_per_s - POWER_MARGIN_W) * (mpc_real)k;
         total_w += road->net_w;
         const mpc_real gives_w = mpc_map_power_to_reach_w(soc, soc - (to_spare / seconds));
         const mpc_real gives_most_w = mpc_par.battery_discharge_max_w - POWER_MARGIN_W;

@@ -7,7 +7,6 @@
  *
  * The same in Python, with the reasons: qpmpc/controllers/realise.py.
  */
-#include "mpc_constants.h"
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
@@ -30,6 +29,7 @@ static mpc_real mean_share(const mpc_state *state, int32_t first, int32_t second
 /* Whether the plan starts the engine, or stops it, for long enough. */
 static int32_t keeps(const mpc_state *state, int32_t first, int32_t wish)
 {
+    const mpc_real threshold = state->cal.on_threshold;
     const int32_t bound_s = (wish != 0) ? mpc_par.min_on_s : mpc_par.min_off_s;
     const int32_t left_s = state->old_arrival_s - first;
     const int32_t is_near = ((state->old_arrival_s < MPC_SHORT) && (left_s < bound_s)) ? 1 : 0;
@@ -38,14 +38,14 @@ static int32_t keeps(const mpc_state *state, int32_t first, int32_t wish)
     const mpc_real mean = mean_share(state, first, seconds);
     int32_t result = 0;
     if (wish != 0) {
-        result = ((mean >= ON_THRESHOLD) && (is_near == 0)) ? 1 : 0;
+        result = ((mean >= threshold) && (is_near == 0)) ? 1 : 0;
     } else {
         /* one that has passed tells nothing of those after it */
         const int32_t fast_s = (state->old_fast_s >= first) ? (state->old_fast_s - first)
                                                             : MPC_SHORT;
         const int32_t is_known = (state->old_fast_s < MPC_SHORT) ? 1 : 0;
         const int32_t is_soon = ((fast_s < bound_s) || (fast_s == 0)) ? is_known : 0;
-        result = ((mean <= ON_THRESHOLD) && (is_soon == 0)) ? 1 : 0;
+        result = ((mean <= threshold) && (is_soon == 0)) ? 1 : 0;
     }
     return result;
 }
@@ -55,11 +55,12 @@ static int32_t keeps(const mpc_state *state, int32_t first, int32_t wish)
 mpc_command mpc_realise(const mpc_state *state)
 {
     const mpc_measured *const seen = &state->watch.good;
+    const mpc_real threshold = state->cal.on_threshold;
     const int32_t first = state->old_age;
     const mpc_real least_w = (first == 0) ? state->old_least_w : REAL(0.0);
     const mpc_real lacking_w = (seen->demand_w + mpc_par.aux_power_w)
                                - mpc_par.battery_discharge_max_w;
-    int32_t on = (state->old_on_share[first] >= ON_THRESHOLD) ? 1 : 0;
+    int32_t on = (state->old_on_share[first] >= threshold) ? 1 : 0;
     int32_t must = ((on != 0) && (lacking_w > REAL(0.0))) ? 1 : 0;
     if ((least_w > REAL(0.0)) || (is_too_fast(seen->speed_mps) != 0)) {
         on = 1;
@@ -72,7 +73,7 @@ mpc_command mpc_realise(const mpc_state *state)
     int32_t is_found = 0;
     for (int32_t k = first; k < MPC_SHORT; k++) {
         const mpc_real share = state->old_on_share[k];
-        if ((on != 0) && (is_found == 0) && (share >= ON_THRESHOLD)) {
+        if ((on != 0) && (is_found == 0) && (share >= threshold)) {
             command.p_eng_w = state->old_p_eng_w[k] / real_min(share, REAL(1.0));
             is_found = 1;
         }

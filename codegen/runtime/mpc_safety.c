@@ -49,10 +49,10 @@ static interval raised(interval of, mpc_real by)
 }
 
 /* The engine's own powers, from the last one no further up than its ramp. */
-static interval of_engine(const mpc_measured *seen)
+static interval of_engine(const mpc_measured *seen, mpc_real ramp_w_per_s)
 {
     const mpc_real before_w = (seen->engine_on != 0) ? seen->p_eng_before_w : REAL(0.0);
-    const mpc_real ramped_w = (before_w + mpc_par.ramp_w_per_s) - POWER_MARGIN_W;
+    const mpc_real ramped_w = (before_w + ramp_w_per_s) - POWER_MARGIN_W;
     const interval allowed = {mpc_par.engine_min_w,
                               real_clip(ramped_w, mpc_par.engine_min_w, mpc_par.engine_max_w)};
     return allowed;
@@ -87,14 +87,14 @@ static interval of_battery(const mpc_measured *seen, mpc_real margin)
     return allowed;
 }
 
-static interval of_soc(const mpc_measured *seen, mpc_real margin)
+static interval of_soc(const mpc_measured *seen, const mpc_calibration *cal, mpc_real margin)
 {
     const mpc_real net_w = seen->demand_w + mpc_par.aux_power_w;
     const mpc_real drawn = margin * SOC_MARGIN;
     const mpc_real emptying_w =
-        real_max(mpc_map_power_to_reach_w(seen->soc, mpc_par.soc_min + drawn),
+        real_max(mpc_map_power_to_reach_w(seen->soc, cal->soc_min + drawn),
                  -mpc_par.battery_charge_max_w); /* far below: as fast as can be */
-    const mpc_real filling_w = mpc_map_power_to_reach_w(seen->soc, mpc_par.soc_max - drawn);
+    const mpc_real filling_w = mpc_map_power_to_reach_w(seen->soc, cal->soc_max - drawn);
     interval allowed;
     if (filling_w <= REAL(0.0)) {
         allowed.high = real_max(net_w, mpc_par.aux_power_w) - filling_w;
@@ -138,12 +138,12 @@ static mpc_real power_for_heat_w(const engine_heat *heat, mpc_real heat_w)
 }
 
 /* Heat of the engine after which the coolant lies in its limits. */
-static interval of_heat(const mpc_measured *seen, mpc_real margin)
+static interval of_heat(const mpc_measured *seen, const mpc_calibration *cal, mpc_real margin)
 {
     const mpc_real out_w = heat_cooling_w(seen->t_cl_degc, seen->speed_mps);
     const mpc_real drawn_k = margin * T_CL_MARGIN_K;
-    const mpc_real low_k = (mpc_par.t_cl_min_degc - seen->t_cl_degc) + drawn_k;
-    const mpc_real high_k = (mpc_par.t_cl_max_degc - seen->t_cl_degc) - drawn_k;
+    const mpc_real low_k = (cal->t_cl_min_degc - seen->t_cl_degc) + drawn_k;
+    const mpc_real high_k = (cal->t_cl_max_degc - seen->t_cl_degc) - drawn_k;
     const interval allowed = {out_w + (low_k * mpc_par.heat_capacity_j_per_k),
                               out_w + (high_k * mpc_par.heat_capacity_j_per_k)};
     return allowed;
@@ -165,20 +165,22 @@ static int32_t better(int32_t wish, const mpc_real *on, const mpc_real *off)
     return choice;
 }
 
-mpc_command mpc_safety_admissible(mpc_command wish, const mpc_measured *seen)
+mpc_command mpc_safety_admissible(mpc_command wish, const mpc_measured *seen,
+                                  const mpc_calibration *cal)
 {
-    const mpc_real start_g = (seen->engine_on != 0) ? REAL(0.0) : mpc_par.start_fuel_g;
-    const engine_heat heat = {mpc_map_cold_factor(seen->t_cl_degc) * mpc_par.lhv_j_per_g,
+    const mpc_real start_g = (seen->engine_on != 0) ? REAL(0.0) : cal->start_fuel_g;
+    const mpc_real factor = mpc_map_cold_factor(seen->t_cl_degc) * mpc_par.lhv_j_per_g;
+    const engine_heat heat = {factor * cal->fuel_scale,
                               heat_engine_w(mpc_par.lhv_j_per_g * start_g, REAL(0.0))};
     const mpc_real cranking_w = (seen->engine_on != 0) ? REAL(0.0) : mpc_par.start_energy_j;
-    interval running = of_engine(seen);
+    interval running = of_engine(seen, cal->ramp_w_per_s);
     mpc_real on[2 * LIMITS];
     mpc_real off[2 * LIMITS];
     for (int32_t tier = 0; tier < 2; tier++) {
         const mpc_real margin = (mpc_real)tier;
         interval powers[LIMITS - 1];
         powers[0] = of_battery(seen, margin);
-        powers[1] = of_soc(seen, margin);
+        powers[1] = of_soc(seen, cal, margin);
         const int32_t first = tier * LIMITS;
         for (int32_t i = 0; i < (LIMITS - 1); i++) {
             const interval powers_on = raised(powers[i], cranking_w);
@@ -186,7 +188,7 @@ mpc_command mpc_safety_admissible(mpc_command wish, const mpc_measured *seen)
             on[first + i] = distance(powers_on, running.low);
             off[first + i] = distance(powers[i], REAL(0.0));
         }
-        const interval warmth = of_heat(seen, margin);
+        const interval warmth = of_heat(seen, cal, margin);
         const interval by_heat = {power_for_heat_w(&heat, warmth.low),
                                   power_for_heat_w(&heat, warmth.high)};
         running = narrowed(running, by_heat);

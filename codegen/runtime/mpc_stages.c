@@ -51,8 +51,8 @@ void mpc_stages_take(mpc_state *state, const mpc_in *in)
         stage->road.free_net_w = in->long_free_net_w[k];
         stage->road.free_internal_off_w = in->long_free_internal_off_w[k];
         /* what rises into a class, falls from it to the next stage, the class below */
-        stage->road.rises = ((k % MPC_CLASSES) > 0) ? (-mpc_par.rise_share * in->long_rises[k - 1])
-                                                    : REAL(0.0);
+        stage->road.rises =
+            ((k % MPC_CLASSES) > 0) ? (-state->cal.rise_share * in->long_rises[k - 1]) : REAL(0.0);
         /* inside a block SOC is not limited: the order of its classes in time is not known */
         const int32_t ends_block = ((k % MPC_CLASSES) == (MPC_CLASSES - 1)) ? 1 : 0;
         stage->road.fall_j = (ends_block != 0) ? in->long_fall_j[k] : -NO_LIMIT_J;

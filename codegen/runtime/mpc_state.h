@@ -1,9 +1,10 @@
-/* Memory of one controller. Its contents are private; the caller needs only its size. */
+/* Memory of one controller. Its contents are private but for `calibration`, see mpc_init. */
 #ifndef MPC_STATE_H
 #define MPC_STATE_H
 
 #include <stdint.h>
 
+#include "mpc_calibration.h"
 #include "mpc_config.h"
 #include "mpc_rows.h"
 #if MPC_COSTATE
@@ -108,6 +109,8 @@ typedef struct {
 
 typedef struct {
     uint32_t magic; /* tells an initialised state from any other memory, as does magic_end */
+    mpc_calibration calibration; /* written from outside */
+    mpc_calibration cal;         /* in use: the last good one */
     mpc_stage stage[MPC_STAGES];
     mpc_stage_iterate kept[MPC_STAGES]; /* to go back to if the solve fails */
     /* Origin of SOC and coolant temperature: the state at the start of the horizon. Small numbers

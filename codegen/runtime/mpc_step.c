@@ -21,6 +21,8 @@ static void set_defined(mpc_state *state)
     state->road_age = MPC_NO_PLAN;
     state->heard.age = MPC_NO_PLAN;
     state->phase = MPC_PHASE_COLD;
+    state->calibration = mpc_par.calibration;
+    state->cal = mpc_par.calibration;
     state->watch.good.soc = mpc_par.soc_init;
     state->watch.good.t_cl_degc = mpc_par.t_cl_init_degc;
     state->watch.soc_since_s = LONG_AGO_S;
@@ -90,7 +92,8 @@ static void depart_slice(mpc_state *state, const mpc_in *in)
 static int32_t measured_before_departure(mpc_state *state, const mpc_in *in)
 {
     int32_t elapsed = 0;
-    const int32_t flags = mpc_check_measured(&state->watch, in, &elapsed);
+    (void)mpc_calibration_take(state); /* a wrong one is flagged in the first second */
+    const int32_t flags = mpc_check_measured(&state->watch, &state->cal, in, &elapsed);
     state->watch.has_clock = 0;
     state->watch.soc_since_s = LONG_AGO_S;
     state->watch.t_cl_since_s = LONG_AGO_S;
@@ -197,17 +200,19 @@ static void keep_plan(mpc_state *state)
 
 int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out)
 {
-    static const mpc_out nothing = {REAL(0.0), REAL(0.0), REAL(0.0), 0, MPC_RULES, 0, 0};
+    static const mpc_out nothing = {REAL(0.0), REAL(0.0), REAL(0.0), 0, MPC_RULES, 0, 0, -1};
     int32_t elapsed = 1;
     *out = nothing;
     if (mpc_check_state(state) == 0) {
         set_defined(state);
         out->flags = MPC_BAD_STATE;
     }
+    out->wrong_entry = mpc_calibration_take(state);
+    out->flags |= (out->wrong_entry < 0) ? 0 : MPC_BAD_CALIBRATION;
     mpc_watch *const watch = &state->watch;
-    out->flags |= mpc_check_measured(watch, in, &elapsed);
+    out->flags |= mpc_check_measured(watch, &state->cal, in, &elapsed);
     /* the rules are evaluated every second, so that their memory is right if they take over */
-    mpc_command command = mpc_rules_decide(&state->rules, &watch->good);
+    mpc_command command = mpc_rules_decide(&state->rules, &watch->good, &state->cal);
 #if MPC_LEARNING
     mpc_learned_take(state);
 #endif
@@ -231,7 +236,7 @@ int32_t mpc_step(mpc_state *state, const mpc_in *in, mpc_out *out)
         out->rung = (is_new != 0) ? MPC_OPTIMISED : MPC_SHIFTED_PLAN;
         command = mpc_realise(state);
     }
-    command = mpc_safety_admissible(command, &watch->good);
+    command = mpc_safety_admissible(command, &watch->good, &state->cal);
     watch->command_on = command.engine_on;
     watch->command_w = command.p_eng_w;
     out->engine_on = command.engine_on;
@@ -252,6 +257,8 @@ int32_t mpc_abi(int32_t entry)
                                                      MPC_ROWS,
                                                      MPC_ITERATIONS,
                                                      (int32_t)offsetof(mpc_in, short_count),
-                                                     (int32_t)offsetof(mpc_out, engine_on)};
+                                                     (int32_t)offsetof(mpc_out, engine_on),
+                                                     (int32_t)offsetof(mpc_state, calibration),
+                                                     MPC_CAL_ENTRIES};
     return ((entry >= 0) && (entry < MPC_ABI_ENTRIES)) ? entries[entry] : -1;
 }

@@ -24,6 +24,7 @@ class Flag(IntFlag):
     WARMING_UP = 8  # the solver has not converged yet since a cold start
     BAD_CLOCK = 16  # a second again, or one that cannot be: then seconds are counted on
     BAD_STATE = 32  # memory of the C controller was not initialised, or was corrupted
+    BAD_CALIBRATION = 64  # of the C controller: numbers refused, the last good ones are in use
 
     def names(self) -> list[str]:
         """Return the flags in words."""
