@@ -24,7 +24,7 @@ Bounds = tuple[float, float]
 
 @dataclass(frozen=True)
 class Entry:
-    """One number: `name` and `default` in SI units, bounds `least` and `most`, what it does."""
+    """One number, its default and its bounds in `unit`; of SOC in shares of a full battery."""
 
     name: str
     unit: str
@@ -67,29 +67,29 @@ class Calibration:
 # Name, unit and what it does, in the order of the page: first those of the safety layer, which
 # mpc_calibration.c checks in the page in use too. Units are those of the C code.
 OF_ALL = """
-soc_min|1|lower limit of SOC, of plan and safety layer
-soc_max|1|upper limit of SOC, of plan and safety layer
+soc_min|SOC|lower limit of SOC, of plan and safety layer
+soc_max|SOC|upper limit of SOC, of plan and safety layer
 t_cl_min_degc|degC|lower limit of the coolant, of the safety layer
 t_cl_max_degc|degC|upper limit of the coolant, of the safety layer
 ramp_w_per_s|W/s|most that the engine's power rises in a second
 fuel_scale|1|factor on the fuel map
 start_fuel_g|g|fuel that a start of the engine takes
-terminal_soc_low|1|lower end of the SOC planned for the arrival
-terminal_soc_high|1|upper end of the SOC planned for the arrival
-soc_reserve|1|SOC kept above the lower limit at the end of a block in which the thermostat opens
+terminal_soc_low|SOC|lower end of the SOC planned for the arrival
+terminal_soc_high|SOC|upper end of the SOC planned for the arrival
+soc_reserve|SOC|SOC kept above the lower limit at the end of a block in which the thermostat opens
 t_min_degc|degC|lower limit of the coolant in the plan: that above and the plan's reserve
 t_max_degc|degC|upper limit of the coolant in the plan
 slack_g_per_k|g/K|price of exceeding a coolant limit of the plan, fuel per stage
 on_threshold|1|share of a second from which on the planned engine runs
-rule_k_soc_w|W|last rung: power asked for per unit of SOC below its reference
-rule_soc_ref|1|last rung: reference of SOC
+rule_k_soc_w|W|last rung: power asked for per whole charge below the reference
+rule_soc_ref|SOC|last rung: reference of SOC
 rule_on_w|W|last rung: the engine starts above this power
 rule_off_w|W|last rung: and stops below this one
 rule_power_min_w|W|last rung: least power when it runs for power
 rule_heat_power_w|W|last rung: power when it runs for heat alone
 rule_heat_on_degc|degC|last rung: the engine starts for heat below this coolant temperature
 rule_heat_off_degc|degC|last rung: until above this one
-rule_soc_forced|1|last rung: the engine is forced on below this SOC
+rule_soc_forced|SOC|last rung: the engine is forced on below this SOC
 rise_share|1|share of the rises of demand in a block that are taken for starts
 """
 OF_SEARCH = """
@@ -98,6 +98,10 @@ search_first_share|1|share of the way to its aim that the first round tries
 search_switch_g_per_s|g/s|cost over which on and off are smoothed, seconds ahead
 search_long_switch_g_per_s|g/s|the same, longer stages
 """
+DESCRIBED = {  # unit and text of every entry, by name
+    name: (unit, what)
+    for name, unit, what in (line.split("|") for line in (OF_ALL + OF_SEARCH).split("\n") if line)
+}
 
 
 def calibration_of(
@@ -123,16 +127,12 @@ def calibration_of(
     given |= {name: default for name, (default, _) in (search or {}).items()}
     bounds = _bounds(vehicle, scalars, has_start, learning)
     bounds |= {name: limits for name, (_, limits) in (search or {}).items()}
-    text = OF_ALL + (OF_SEARCH if search else "")
+    names = [name for name in DESCRIBED if search or not name.startswith("search_")]
     entries = []
-    for line in text.split("\n"):
-        if line:
-            name, unit, what = line.split("|")
-            default = float(given[name])
-            least, most = bounds[name]
-            entries.append(
-                Entry(name, unit, what, default, min(least, default), max(most, default))
-            )
+    for name in names:
+        (unit, what), default = DESCRIBED[name], float(given[name])
+        least, most = bounds[name]
+        entries.append(Entry(name, unit, what, default, min(least, default), max(most, default)))
     page = {entry.name: entry.default for entry in entries}
     room_soc = max(LEAST_ROOM_SOC, _second_soc(vehicle))
     return Calibration(tuple(entries), tuple(_orders(page, room_soc, band_soc)))

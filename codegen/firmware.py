@@ -31,7 +31,8 @@ INSTRUCTIONS_A_TICK = 1e9 / TIMER_HZ / 2**ICOUNT_SHIFT
 STACK_RESERVED_BYTES = 4096  # in cortex_m7.ld
 ANSWER_TIMEOUT_S = 300.0
 LOOK_EVERY_S = 0.2  # whether QEMU is still running
-_INIT, _DEPART, _STEP, _STOP = range(4)
+_INIT, _DEPART, _STEP, _STOP, _SERVE = range(5)
+_LINE = "line"  # pipes of the serial line: line.in, line.out
 
 
 def missing_tools(names: Sequence[str] = (COMPILER, SIZE, NM, QEMU, "make")) -> list[str]:
@@ -196,9 +197,17 @@ class Target:
     elf : firmware
     values, precision : that it was generated from
     folder : for the pipes; QEMU runs in it
+    has_line : whether it was built with XCP=1, and serves a calibration tool at its serial line
     """
 
-    def __init__(self, elf: Path, values: Values, precision: Precision, folder: Path) -> None:
+    def __init__(
+        self,
+        elf: Path,
+        values: Values,
+        precision: Precision,
+        folder: Path,
+        has_line: bool = False,
+    ) -> None:
         require_tools()
         sizes = values.sizes
         self.input_type, output = structures(
@@ -220,10 +229,12 @@ class Target:
 
         self._answer_type = _Answer
         self._in_bytes, self._out_bytes = ctypes.sizeof(self.input_type), ctypes.sizeof(output)
-        for name in ("request", "answer"):
+        lines = (f"{_LINE}.in", f"{_LINE}.out") if has_line else ()
+        for name in ("request", "answer", *lines):
             (folder / name).unlink(missing_ok=True)
             os.mkfifo(folder / name)
-        machine = "-M mps2-an500 -nographic -monitor none -serial none"
+        serial = f"pipe:{_LINE}" if has_line else "none"
+        machine = f"-M mps2-an500 -nographic -monitor none -serial {serial}"
         self._process = subprocess.Popen(
             [
                 QEMU,
@@ -240,6 +251,7 @@ class Target:
         # Opening for both ways never blocks, even if QEMU fails to start.
         self._requests = os.open(folder / "request", os.O_RDWR)
         self._answers = os.open(folder / "answer", os.O_RDWR)
+        self._line = [os.open(folder / name, os.O_RDWR) for name in lines]
 
     def __enter__(self) -> Self:
         return self
@@ -261,7 +273,7 @@ class Target:
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
-        for descriptor in (self._requests, self._answers):
+        for descriptor in (self._requests, self._answers, *self._line):
             os.close(descriptor)
         self._requests = self._answers = -1
 
@@ -276,6 +288,14 @@ class Target:
     def step(self, inputs: Any) -> Answer:
         """Call mpc_step."""
         return self._ask(_STEP, inputs)
+
+    def exchange(self, frame: bytes) -> bytes:
+        """Let the firmware take a command from its serial line; returns what it has sent there."""
+        to_target, from_target = self._line
+        os.write(to_target, frame)
+        self._ask(_SERVE, self.input_type())
+        ready, _, _ = select.select([from_target], [], [], LOOK_EVERY_S)
+        return os.read(from_target, 4096) if ready else b""
 
     def _ask(self, command: int, inputs: Any) -> Answer:
         os.write(self._requests, command.to_bytes(4, "little") + bytes(inputs))

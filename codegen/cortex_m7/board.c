@@ -1,4 +1,4 @@
-/* Semihosting and the CMSDK timer. */
+/* Semihosting, the CMSDK timer and its serial line. */
 #include "board.h"
 
 enum { SYS_OPEN = 0x01, SYS_WRITE = 0x05, SYS_READ = 0x06, SYS_EXIT_EXTENDED = 0x20 };
@@ -10,6 +10,20 @@ typedef struct {
     volatile uint32_t value;
     volatile uint32_t reload;
 } cmsdk_timer;
+
+typedef struct {
+    volatile uint32_t data;
+    volatile uint32_t state;
+    volatile uint32_t control;
+    volatile uint32_t interrupts;
+    volatile uint32_t divider;
+} cmsdk_uart;
+
+#define UART ((cmsdk_uart *)0x40004000u)
+#define UART_FULL 1u     /* to be sent */
+#define UART_RECEIVED 2u /* to be read */
+#define UART_BOTH_WAYS 3u
+#define UART_DIVIDER 217u /* 115200 of 25 MHz */
 
 #define TIMER ((cmsdk_timer *)0x40000000u)
 #define TIMER_ENABLE 1u
@@ -67,6 +81,26 @@ void board_exit(int32_t code)
     (void)call_host(SYS_EXIT_EXTENDED, arguments);
     for (;;) {
     }
+}
+
+void board_open_line(void)
+{
+    UART->divider = UART_DIVIDER;
+    UART->control = UART_BOTH_WAYS;
+}
+
+uint8_t board_receive(void)
+{
+    while ((UART->state & UART_RECEIVED) == 0u) {
+    }
+    return (uint8_t)UART->data;
+}
+
+void board_send(uint8_t byte)
+{
+    while ((UART->state & UART_FULL) != 0u) {
+    }
+    UART->data = byte;
 }
 
 void board_start_timer(void)

@@ -17,6 +17,11 @@ __attribute__((noreturn)) void board_exit(int32_t code);
 void board_start_timer(void);
 uint32_t board_ticks(void);
 
+/* Serial line, CMSDK UART0; each waits. */
+void board_open_line(void);
+uint8_t board_receive(void);
+void board_send(uint8_t byte);
+
 void board_paint_stack(void);
 uint32_t board_stack_used(void);
 

@@ -1,12 +1,22 @@
 /* Firmware of the processor-in-the-loop test: reads a request, runs the controller, answers.
  *
  * A request is a command word and an mpc_in; an answer is the struct below. Both are exchanged
- * through files "request" and "answer" of the host, which are pipes.
+ * through files "request" and "answer" of the host, which are pipes. A build with BOARD_XCP also
+ * serves a calibration tool at the serial line, between the steps.
  */
 #include "board.h"
 #include "mpc.h"
+#if defined(BOARD_XCP)
+#include "xcp.h"
+#endif
 
-enum { COMMAND_INIT = 0, COMMAND_DEPART = 1, COMMAND_STEP = 2, COMMAND_STOP = 3 };
+enum {
+    COMMAND_INIT = 0,
+    COMMAND_DEPART = 1,
+    COMMAND_STEP = 2,
+    COMMAND_STOP = 3,
+    COMMAND_SERVE = 4 /* one command of a calibration tool, in a build with BOARD_XCP */
+};
 
 typedef struct {
     int32_t result;       /* return value of the function called */
@@ -24,6 +34,15 @@ static mpc_state state;
 static mpc_in in;
 static answer reply;
 
+#if defined(BOARD_XCP)
+extern uint8_t link_data_start[];
+extern uint8_t link_stack_top[];
+static xcp_slave tool = {{link_data_start, link_stack_top}, /* all RAM may be read */
+                         {(const uint8_t *)&state.calibration, (const uint8_t *)&state.cal},
+                         0u,
+                         0};
+#endif
+
 static int32_t run(uint32_t command)
 {
     int32_t result = 0;
@@ -31,6 +50,10 @@ static int32_t run(uint32_t command)
         mpc_init(&state);
     } else if (command == COMMAND_DEPART) {
         result = mpc_depart(&state, &in);
+#if defined(BOARD_XCP)
+    } else if (command == COMMAND_SERVE) {
+        xcp_serve(&tool);
+#endif
     } else {
         result = mpc_step(&state, &in, &reply.out);
     }
@@ -46,6 +69,9 @@ int main(void)
     int32_t result = ((requests < 0) || (answers < 0)) ? -1 : 0;
     uint32_t command = COMMAND_INIT;
     board_start_timer();
+#if defined(BOARD_XCP)
+    board_open_line();
+#endif
     while ((result == 0) && (command != COMMAND_STOP)) {
         result = board_read(requests, &command, sizeof(command));
         if ((result == 0) && (command != COMMAND_STOP)) {

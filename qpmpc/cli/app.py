@@ -8,6 +8,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from qpmpc._version import __version__
+from qpmpc.cli.a2l import a2l
 from qpmpc.cli.benchmark import benchmark
 from qpmpc.cli.codegen import codegen
 from qpmpc.cli.compare import compare
@@ -50,6 +51,7 @@ app.command()(benchmark)
 app.command()(codegen)
 app.command()(pil)
 app.command()(fmu)
+app.command()(a2l)
 app.command()(reproduce)
 app.command()(verify)
 app.command()(sweep)

@@ -21,6 +21,7 @@ DISABLES = {
     "logs": "trips from GPX and MDF files",
     "fastsim": "FASTSim's car as the plant",
     "prototype": "C for own terms in cvxpy",
+    "a2l": "descriptions for calibration tools: a2l, pil --calibrate",
     "fmu": "checks of an FMU by FMPy; the export itself needs none",
 }
 # Imports one after the other and says so; a package may print, or end the process
