@@ -66,6 +66,7 @@ class Calibration:
 
 # Name, unit and what it does, in the order of the page: first those of the safety layer, which
 # mpc_calibration.c checks in the page in use too. Units are those of the C code.
+OF_SAFETY = 7
 OF_ALL = """
 soc_min|SOC|lower limit of SOC, of plan and safety layer
 soc_max|SOC|upper limit of SOC, of plan and safety layer

@@ -11,6 +11,7 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 from numpy.typing import NDArray
 
 from qpmpc._version import __version__
+from qpmpc.codegen.calibration import OF_SAFETY
 from qpmpc.codegen.examples import example_files
 from qpmpc.codegen.osqp_source import CONSTANT_ARRAYS, PREFIX, osqp_files, osqp_version
 from qpmpc.codegen.prefix import checked_prefix, with_prefix
@@ -259,6 +260,7 @@ def _context(
         "scalars": scalars | counts,
         "counts": counts,
         "calibration": values.calibration,
+        "of_safety": OF_SAFETY,
         "literal": literal,
         "arrays": {name: literals(array, precision) for name, array in values.arrays.items()},
         "fuel_stride": 1 << ((values.sizes.fuel_points - 1).bit_length() - 1),

@@ -31,6 +31,7 @@ DATATYPES = {
     "b": "SBYTE",
     "B": "UBYTE",
 }
+LAYOUTS = {f"value_{name.lower()}": kind for kind, name in DATATYPES.items()}
 IN_USE = "cal"  # the member of mpc_state that holds the numbers in use
 
 

@@ -135,7 +135,7 @@ class PilResult:
         }
 
 
-class _OnTarget(Controller):
+class OnTarget(Controller):
     """The firmware as a controller."""
 
     implementation = "c"
@@ -151,6 +151,7 @@ class _OnTarget(Controller):
         self.instructions: list[int] = []
         self.flags: list[int] = []
         self.stack_bytes = self.state_bytes = 0
+        self.last_out: Any = None  # `mpc_out` of the last step
 
     def depart(self, progress: Progress | None = None) -> None:
         """Solve the first plan on the target, slice by slice."""
@@ -168,6 +169,7 @@ class _OnTarget(Controller):
         answer = self._target.step(self._in)
         self.instructions.append(answer.instructions)
         self.flags.append(answer.result)
+        self.last_out = answer.out
         self.stack_bytes, self.state_bytes = answer.stack_bytes, answer.state_bytes
         return self._method.decision(answer.out)
 
@@ -213,7 +215,7 @@ def processor_in_the_loop(
         elf = build_firmware(values, precision, folder, algorithm)
         with Target(elf, values, precision, folder) as target:
             label = f"{algorithm} {precision} on cortex-m7"
-            firmware = _OnTarget(trip, method, target, label)
+            firmware = OnTarget(trip, method, target, label)
             start = perf_counter()
             run = drive(trip, firmware, on_step=compare, progress=progress)
             seconds = perf_counter() - start

@@ -30,9 +30,8 @@ int32_t mpc_calibration_take(mpc_state *state)
 /* The first numbers, by which the safety layer keeps the limits; what the others do, it undoes. */
 int32_t mpc_calibration_check(const mpc_calibration *cal)
 {
-    const mpc_real value[] = {cal->soc_min,       cal->soc_max,      cal->t_cl_min_degc,
-                              cal->t_cl_max_degc, cal->ramp_w_per_s, cal->fuel_scale,
-                              cal->start_fuel_g};
-    const int32_t count = (int32_t)(sizeof(value) / sizeof(value[0]));
-    return (unbounded(value, count, -1) < 0) ? 1 : 0;
+    const mpc_real value[MPC_CAL_OF_SAFETY] = {
+        cal->soc_min,      cal->soc_max,    cal->t_cl_min_degc, cal->t_cl_max_degc,
+        cal->ramp_w_per_s, cal->fuel_scale, cal->start_fuel_g};
+    return (unbounded(value, MPC_CAL_OF_SAFETY, -1) < 0) ? 1 : 0;
 }

@@ -11,6 +11,7 @@ from qpmpc.cli.options import CYCLE_ARGUMENT, JsonOption, OutOption, SetOption, 
 if TYPE_CHECKING:
     from qpmpc.codegen.generate import Algorithm, Precision
     from qpmpc.codegen.method import Generated
+    from qpmpc.codegen.pil.calibrated import Change
     from qpmpc.controllers.settings import ControllerSettings
     from qpmpc.trip import Trip
 
@@ -46,6 +47,15 @@ def pil(
             "instructions and memory against fuel above DP.",
         ),
     ] = False,
+    calibrate: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE@SECOND",
+            help="While the cycle runs, write a number over XCP at the emulator's serial line, in "
+            "the unit of docs/calibration.md; repeat it for several.",
+            show_default=False,
+        ),
+    ] = None,
     project: Annotated[
         Path | None,
         typer.Option(
@@ -102,6 +112,8 @@ def pil(
 
       qpmpc pil nycc --pareto --out results/pil
 
+      qpmpc pil nycc --calibrate t_min_degc=49@100 --calibrate soc_min=0.9@200
+
       qpmpc pil nycc --project my_board --clock-mhz 480
 
       qpmpc pil --project my_board --from-log board.log
@@ -112,6 +124,7 @@ def pil(
     from qpmpc.codegen.firmware import require_tools
     from qpmpc.codegen.generate import ALGORITHMS, PRECISIONS, one_of
     from qpmpc.codegen.method import GENERATED
+    from qpmpc.codegen.pil.calibrated import Change
     from qpmpc.errors import InputError
     from qpmpc.registry import check_controllers
     from qpmpc.trip import Trip
@@ -129,6 +142,8 @@ def pil(
     if name != "mh-qp" and (algorithm is not None or pareto):
         option = "--pareto" if pareto else "--algorithm"
         raise InputError(f"{option} is for mh-qp alone, not for {name}: leave it out")
+    if calibrate and pareto:
+        raise InputError("--calibrate is for one run, not for --pareto: leave one out")
     if project is None:
         board.refuse(context, board.OF_BOARD, "without --project or --from-log")
     precisions = PRECISIONS if precision is None else (one_of(precision, PRECISIONS, "precision"),)
@@ -136,16 +151,19 @@ def pil(
     car, settings = load_vehicle_and_settings(vehicle, set_)
     trip = Trip(cycle, car)
     if project is not None:
-        board.refuse(context, ("pareto", "json_file", "out"), "with --project")
+        board.refuse(context, ("pareto", "calibrate", "json_file", "out"), "with --project")
         chosen = (of_board, name, precisions[0], algorithms[0], seconds, clock_mhz)
         board.make(trip, settings, project, *chosen)
         return
     check_outputs(json_file, out)
+    changes = [Change.parsed(text) for text in calibrate or ()]
     if pareto:
         check_controllers(["dp"])
     require_tools()
     if pareto:
         _pareto(trip, settings, precisions, algorithms, json_file, out)
+    elif changes:
+        _calibrated(trip, changes, settings, precisions[0], algorithms[0], name, json_file, out)
     else:
         _one_run(trip, settings, name, precisions[0], algorithms[0], json_file, out)
 
@@ -173,6 +191,38 @@ def _one_run(
     if out is not None:
         for remark in write_pil(result, out):
             console.print(remark)
+
+
+def _calibrated(
+    trip: "Trip",
+    changes: "list[Change]",
+    settings: "ControllerSettings",
+    precision: "Precision",
+    algorithm: "Algorithm",
+    controller: "Generated",
+    json_file: Path | None,
+    out: Path | None,
+) -> None:
+    from qpmpc.cli.console import progress_bar, result_console, write_json
+    from qpmpc.codegen.pil.calibrated import calibrated_trip
+    from qpmpc.codegen.pil.calibrated_report import (
+        HEADER,
+        calibrated_line,
+        calibrated_rows,
+        write_calibrated,
+    )
+    from qpmpc.report.table import print_texts
+
+    with progress_bar(1) as bar:
+        report = bar.next_job(f"{trip.cycle.name}, firmware of {controller} {precision}, twice")
+        found = calibrated_trip(trip, changes, settings, precision, algorithm, controller, report)
+    write_json(found.as_data(), json_file)
+    console = result_console(json_file)
+    print_texts(console, HEADER, calibrated_rows(found), names=2)
+    for remark in (calibrated_line(found), *trip.remarks):
+        console.print(remark)
+    if out is not None:
+        write_calibrated(found, out)
 
 
 def _pareto(

@@ -131,4 +131,6 @@ def test_names_and_constructs_that_c_does_not_have_are_refused() -> None:
         with pytest.raises(FormulaError):
             writer.expression(expression(text))
     with pytest.raises(FormulaError):
-        values_h(Table(), ["t_amb_degc"], False)  # the other parameters are unknown
+        values_h(
+            Table(), (("t_amb_degc", "mpc_par.t_amb_degc"),), False
+        )  # the other parameters are unknown
