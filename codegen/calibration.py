@@ -78,7 +78,7 @@ start_fuel_g|g|fuel that a start of the engine takes
 terminal_soc_low|SOC|lower end of the SOC planned for the arrival
 terminal_soc_high|SOC|upper end of the SOC planned for the arrival
 soc_reserve|SOC|SOC kept above the lower limit at the end of a block in which the thermostat opens
-t_min_degc|degC|lower limit of the coolant in the plan: that above and the plan's reserve
+t_min_degc|degC|lower limit of the coolant in the plan: that of the safety layer and a reserve
 t_max_degc|degC|upper limit of the coolant in the plan
 slack_g_per_k|g/K|price of exceeding a coolant limit of the plan, fuel per stage
 on_threshold|1|share of a second from which on the planned engine runs

@@ -36,7 +36,9 @@ static int is_declared(const mpc_out *out)
     fine &= has_solved || (out->iterations == 0 && (out->flags & MPC_BAD_PREVIEW));
     fine &= has_solved || !(out->flags & unusable);
     fine &= (out->rung == MPC_OPTIMISED) == (has_solved && !(out->flags & unusable));
-    return fine && (out->rung == MPC_RULES || !(out->flags & MPC_BAD_STATE));
+    /* a method that warms up has no plan in its first second */
+    const int has_plan = MPC_WARM_UP_STEPS <= 1 || !(out->flags & MPC_BAD_STATE);
+    return fine && (out->rung == MPC_RULES || has_plan);
 }
 
 static int is_in_range(const second_start *told, const mpc_out *out)

@@ -39,7 +39,7 @@ SECONDS = 130
 def elf(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("a2l")
     generate(VALUES, folder, "cortex-m7", "f32")
-    return make_firmware(folder, "XCP=1")
+    return make_firmware(folder, "XCP=1", "CFLAGS=-O1")
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 import ctypes
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -228,6 +229,27 @@ def test_every_bound_and_default_is_accepted(vehicle, precision) -> None:
         beyond = 1e-6 * max(abs(entry.most), 1.0)
         assert refused({entry.name: entry.least - beyond}), entry
         assert refused({entry.name: entry.most + beyond}), entry
+
+
+def test_the_documented_numbers_are_those_of_the_code() -> None:
+    text = (Path(__file__).parents[2] / "docs" / "calibration.md").read_text("utf-8")
+    found = [line for line in text.splitlines() if line.startswith("| `")]
+    of_qp, of_costate = (method(name).values(VEHICLE, None).calibration for name in NAMES)
+
+    def either(one: float, two: float) -> str:
+        return f"{one:g}" if one == two else f"{one:g} (mh-qp), {two:g}"
+
+    defaults = {entry.name: entry.default for entry in of_qp.entries}
+    rows = [
+        f"| `{e.name}` | {e.unit} | {either(defaults.get(e.name, e.default), e.default)} | "
+        f"{e.least:g} to {e.most:g} | {e.what} |"
+        for e in of_costate.entries
+    ]
+    rows += [
+        f"| `{two.low}` | `{two.high}` | {either(one.gap, two.gap)} |"
+        for one, two in zip(of_qp.orders, of_costate.orders, strict=True)
+    ]
+    assert found == rows
 
 
 def test_a_simulation_with_other_numbers(tmp_path) -> None:
