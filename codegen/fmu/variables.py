@@ -10,7 +10,7 @@ from qpmpc.vehicle.parameters import Vehicle
 Kind = Literal["real", "integer", "boolean"]
 Role = Literal["independent", "parameter", "input", "output"]
 
-LAST_FLAG = 32  # of mpc_out.flags
+LAST_FLAG = 64  # of mpc_out.flags
 LAST_RUNG = 2
 
 
@@ -113,7 +113,7 @@ def controller_variables(vehicle: Vehicle, learning: bool, certificate: bool) ->
             "flags",
             "output",
             "What was wrong in this second, a sum of: 1 measurement, 2 preview, 4 solver, 8 "
-            "warming up, 16 clock, 32 memory",
+            "warming up, 16 clock, 32 memory, 64 calibration",
             kind="integer",
             low=0,
             high=2 * LAST_FLAG - 1,

@@ -83,17 +83,21 @@ class Changed:
     differs_from: int | None
 
     def as_data(self) -> dict[str, Any]:
-        """Return plain data, ready for JSON."""
+        """Return plain data, ready for JSON; null where a number is none or infinite."""
         return {
             "name": self.change.name,
-            "value": self.change.number,
+            "value": _finite(self.change.number),
             "second": self.change.second,
             "address": self.address,
-            "before": self.before,
+            "before": _finite(self.before),
             "refused": self.refused,
             "wrong_entry": self.wrong_entry,
             "command_differs_from_s": self.differs_from,
         }
+
+
+def _finite(number: float) -> float | None:
+    return number if np.isfinite(number) else None
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """A2L files and XCP: what a calibration tool reads is what the firmware checks and does."""
 
+import json
 import struct
 from pathlib import Path
 
@@ -162,6 +163,21 @@ def test_a_wrong_number_is_refused_flagged_and_named(found, tmp_path) -> None:
     write_calibrated(found, tmp_path)
     names = {file.name for file in tmp_path.iterdir()}
     assert names == {"controller.a2l", "as_it_is.csv", "calibrated.csv"}
+
+
+def test_the_command_shows_what_became_of_each_change(found, tmp_path, monkeypatch) -> None:
+    """The trips are those of the tests above: they are not driven again."""
+    monkeypatch.setattr("qpmpc.codegen.pil.calibrated.calibrated_trip", lambda *_: found)
+    command = ["pil", "nycc", "--controller", "mh-costate", "--calibrate", "soc_min=0.9@60"]
+    done = CliRunner().invoke(app, [*command, "--json", str(tmp_path / "it.json")])
+    assert done.exit_code == 0, done.output
+    data = json.loads((tmp_path / "it.json").read_text())
+    assert [change["refused"] for change in data["changes"]] == [True, True, True, False, False]
+    assert {"as_it_is", "calibrated"} < {*data}
+    for refused in (["--pareto"], ["--project", str(tmp_path / "board")]):
+        other = ["pil", "nycc", "--calibrate", "soc_min=0.9@60", *refused]
+        with pytest.raises(InputError, match="--calibrate"):
+            app(other, standalone_mode=False)
 
 
 @pytest.mark.parametrize(
