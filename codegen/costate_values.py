@@ -33,8 +33,8 @@ CONSTANTS = CONSTANTS_OF_ALL | of_modules(
     (funnel, "ENDLESS_RESPONSE LEAST_RESPONSE UNLIMITED"),
     (
         solve,
-        "CHARGE_HALF_STEPS HEAT_HALF_STEPS LEAST_RISE_G BACKGROUND LEAST_DECAY AT_SLACK FIRST_SHARE"
-        " MOST_SHARE GROWS SHRINKS STREAK",
+        "CHARGE_QUARTER_STEPS HEAT_QUARTER_STEPS LEAST_RISE_G BACKGROUND LEAST_DECAY AT_SLACK"
+        " FIRST_SHARE MOST_SHARE GROWS SHRINKS STREAK",
     ),
     (certificate, "ABOVE_MULTIPLIERS"),
 )
@@ -137,4 +137,4 @@ def _for_bisection(envelope: Curves, stride: int) -> Floats:
 
 def _names_of_dual(has_start: bool) -> str:
     """Names of the constants of the dual that this car needs."""
-    return f"LEAST_SWITCH_G {f'{START_SWITCH} START_HALF_STEPS' if has_start else SWITCH}"
+    return f"LEAST_SWITCH_G {f'{START_SWITCH} START_QUARTER_STEPS' if has_start else SWITCH}"
