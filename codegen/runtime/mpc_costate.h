@@ -86,7 +86,8 @@ typedef struct {
     mpc_real limit[2]; /* of the sum: lower, upper */
     mpc_real bound[2]; /* of the price, by these limits, on the way */
     mpc_real decay;
-    mpc_real price; /* found */
+    mpc_real beyond; /* price where a walk cut short does not come, where terms decay */
+    mpc_real price;  /* found */
 } mpc_costate_term;
 
 typedef struct {
@@ -100,6 +101,11 @@ typedef struct {
     mpc_real given_heat; /* multiplier of a coolant limit that is given up, else 0 */
 } mpc_stage;
 
+/* What a round of the search moves: all multipliers, those of SOC, those of the coolant. */
+#define MPC_MOVES_BOTH 0
+#define MPC_MOVES_CHARGE 1
+#define MPC_MOVES_HEAT 2
+
 /* The search. */
 typedef struct {
     mpc_costate_term
@@ -108,6 +114,7 @@ typedef struct {
     mpc_real constant_g[2];
     mpc_real share; /* of the way to the aim that is tried next */
     int32_t streak; /* rounds in a row that rose */
+    int32_t moved;  /* by the next round, see above */
     int32_t here;   /* which dual the search is at */
     mpc_real certificate_g;
 } mpc_search;

@@ -52,7 +52,7 @@ static void aim_charge(mpc_state *state)
         const int32_t first = MPC_SHORT + (MPC_CLASSES * i);
         put_charge(&term[MPC_SHORT + i], &stage[first], MPC_CLASSES, which);
     }
-    mpc_costate_funnel(&state->search, SOC_TERMS, (CHARGE_HALF_STEPS * SOC_TERMS) / 2);
+    mpc_costate_funnel(&state->search, SOC_TERMS, (CHARGE_QUARTER_STEPS * SOC_TERMS) / 4);
     for (int32_t k = 0; k < MPC_SHORT; k++) {
         stage[k].goal_charge = charge_of(&term[k], most_g);
     }
@@ -71,6 +71,8 @@ static void aim_heat(mpc_state *state)
     mpc_costate_term *const term = state->search.term;
     const mpc_real slack = state->cal.slack_g_per_k;
     const mpc_real most = AT_SLACK * slack;
+    const mpc_real of_charge =
+        pick((state->search.moved == MPC_MOVES_HEAT) ? 1 : 0, REAL(0.0), REAL(1.0));
     mpc_real change = REAL(0.0); /* M of the limits given up less that of the multipliers now */
     for (int32_t k = MPC_STAGES - 1; k >= 0; k--) {
         mpc_stage *const stage = &state->stage[k];
@@ -82,25 +84,32 @@ static void aim_heat(mpc_state *state)
         const mpc_real is_cold = not_below(dual->heat, most) * above(low, REAL(0.0));
         const mpc_real is_hot = not_below(-most, dual->heat) * above(REAL(0.0), high);
         const mpc_real given = slack * (is_cold - is_hot);
-        const mpc_real more = dual->cross * (stage->goal_charge - dual->charge);
+        const mpc_real more = of_charge * dual->cross * (stage->goal_charge - dual->charge);
         stage->given_heat = given;
         change += given - dual->heat;
         term[k].response = (dual->of_heat + p->least_of_heat) * p->per_end * p->per_end;
         term[k].offset = (more * p->per_end) + (term[k].response * change);
-        term[k].limit[0] = low - (NO_LIMIT * is_cold);
-        term[k].limit[1] = high + (NO_LIMIT * is_hot);
+        /* one that has a multiplier now is aimed at from either side */
+        term[k].limit[0] = pick(dual->heat < REAL(0.0), high, low) - (NO_LIMIT * is_cold);
+        term[k].limit[1] = pick(dual->heat > REAL(0.0), low, high) + (NO_LIMIT * is_hot);
         term[k].decay = p->decay;
+        term[k].beyond = -change;
         term[k].price = MPC_NO_PRICE;
         change *= p->decay;
     }
-    mpc_costate_funnel_decaying(&state->search, MPC_STAGES, (HEAT_HALF_STEPS * MPC_STAGES) / 2);
+    mpc_costate_funnel_decaying(&state->search, MPC_STAGES, (HEAT_QUARTER_STEPS * MPC_STAGES) / 4);
 }
 
-/* The point to try, with multipliers of the right sign: so far on the way to the aim, or beyond. */
+/* The point to try, with multipliers of the right sign: so far on the way to the aim, or beyond. One
+ * of the coolant ends at 0 where it would change its sign. */
 static void go_towards(mpc_state *state, int32_t tried)
 {
     const mpc_costate_term *const term = state->search.term;
-    const mpc_real share = state->search.share;
+    const mpc_search *const search = &state->search;
+    const mpc_real of_heat =
+        pick((search->moved == MPC_MOVES_CHARGE) ? 1 : 0, REAL(0.0), search->share);
+    const mpc_real of_charge =
+        pick((search->moved == MPC_MOVES_HEAT) ? 1 : 0, REAL(0.0), search->share);
     const mpc_real slack = state->cal.slack_g_per_k;
     mpc_real after = REAL(0.0); /* price of the next stage, times its decay */
     for (int32_t k = MPC_STAGES - 1; k >= 0; k--) {
@@ -109,9 +118,11 @@ static void go_towards(mpc_state *state, int32_t tried)
         mpc_costate_dual *const there = &stage->dual[tried];
         const mpc_real jump = term[k].price - after;
         const mpc_real goal = real_clip(jump + stage->given_heat, -slack, slack);
-        const mpc_real heat = here->heat + (share * (goal - here->heat));
-        const mpc_real charge = here->charge + (share * (stage->goal_charge - here->charge));
-        there->heat = real_clip(heat, -slack, slack);
+        const mpc_real heat = here->heat + (of_heat * (goal - here->heat));
+        const mpc_real charge = here->charge + (of_charge * (stage->goal_charge - here->charge));
+        const mpc_real least = pick(here->heat > REAL(0.0), REAL(0.0), -slack);
+        const mpc_real greatest = pick(here->heat < REAL(0.0), REAL(0.0), slack);
+        there->heat = real_clip(heat, least, greatest);
         there->charge = real_max(charge, REAL(0.0));
         after = term[k].price * stage->p.decay;
     }

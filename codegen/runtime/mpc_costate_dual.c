@@ -77,7 +77,7 @@ static void price_starts_ahead(mpc_state *state, int32_t which)
     }
     const mpc_real first = (REAL(1.0) - on_now) * real_max(after, REAL(0.0));
     term[0].offset += first;
-    mpc_costate_funnel(&state->search, MPC_SHORT, (START_HALF_STEPS * MPC_SHORT) / 2);
+    mpc_costate_funnel(&state->search, MPC_SHORT, (START_QUARTER_STEPS * MPC_SHORT) / 4);
     mpc_real edge = REAL(0.0);
     mpc_real before = first;
     for (int32_t k = 0; k < MPC_SHORT; k++) {

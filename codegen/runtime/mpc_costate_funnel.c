@@ -25,8 +25,8 @@ static inline mpc_real surely_above(mpc_real a, mpc_real b)
 static void put_end(mpc_costate_term *end)
 {
     const mpc_costate_term zero = {
-        REAL(0.0), ENDLESS_RESPONSE, {REAL(0.0), REAL(0.0)}, {REAL(0.0), REAL(0.0)},
-        REAL(1.0), REAL(0.0)};
+        REAL(0.0), ENDLESS_RESPONSE, {REAL(0.0), REAL(0.0)}, {REAL(0.0), REAL(0.0)}, REAL(1.0),
+        REAL(0.0), MPC_NO_PRICE};
     *end = zero;
 }
 
@@ -82,11 +82,16 @@ static inline void walk(mpc_search *search, int32_t count, int32_t steps, int32_
         most = (goes_on * most) + (ended * UNLIMITED);
         k = real_min((k - (ended * (k - at))) + REAL(1.0), last);
     }
-    /* of a walk cut short, the rest has the price that meets the limits seen; 0 at the end */
+    /* Of a walk cut short, the rest has the price that meets the limits seen, or that given where
+     * terms decay; the walk has come to the end if the term beyond the last has its price. */
     mpc_real price = real_max(least, real_min(most, REAL(0.0)));
+    int32_t reached = (term[count].price < UNLIMITED) ? 1 : 0;
+    price *= (decays != 0) ? (mpc_real)reached : REAL(1.0);
     for (int32_t i = count - 1; i >= 0; i--) {
-        price = blend(surely_above(UNLIMITED, term[i].price), term[i].price, price);
-        term[i].price = price;
+        const int32_t ends = (term[i].price < UNLIMITED) ? 1 : 0;
+        price = pick(ends, term[i].price, price);
+        reached |= ends;
+        term[i].price = (decays != 0) ? pick(reached, price, term[i].beyond) : price;
         price *= (decays != 0) ? term[i].decay : REAL(1.0);
     }
 }

@@ -16,6 +16,7 @@ int32_t mpc_method_check(const mpc_state *state)
 {
     const mpc_search *const search = &state->search;
     int32_t fine = ((search->here == 0) || (search->here == 1)) ? 1 : 0;
+    fine &= ((search->moved >= MPC_MOVES_BOTH) && (search->moved <= MPC_MOVES_HEAT)) ? 1 : 0;
     fine &= ((search->streak >= 0) && (search->streak <= STREAK)) ? 1 : 0;
     return fine & within(search->share, REAL(0.0), MOST_SHARE);
 }
@@ -26,6 +27,7 @@ void mpc_method_start(mpc_state *state)
     mpc_costate_program_fill(state);
     search->here = 0;
     search->streak = 0;
+    search->moved = MPC_MOVES_BOTH;
     search->share = state->cal.search_first_share;
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         mpc_stage *const stage = &state->stage[k];
@@ -48,9 +50,12 @@ int32_t mpc_method_iterate(mpc_state *state, int32_t count)
         const int32_t grows = ((streak >= STREAK) || (search->share < REAL(1.0))) ? 1 : 0;
         const mpc_real grown = real_min(GROWS * search->share, MOST_SHARE);
         const mpc_real more = pick(grows, grown, search->share);
+        const int32_t next = (search->moved < MPC_MOVES_HEAT) ? (search->moved + 1)
+                                                              : MPC_MOVES_BOTH;
         const mpc_real less = SHRINKS * real_min(search->share, REAL(1.0));
         search->here = (rises != 0) ? tried : search->here;
         search->streak = (rises != 0) ? streak : 0;
+        search->moved = (rises != 0) ? MPC_MOVES_BOTH : next;
         search->share = pick(rises, more, less);
     }
     return within(search->value[search->here], -LARGEST, LARGEST);

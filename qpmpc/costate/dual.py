@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 SWITCH_G_PER_S, LONG_SWITCH_G_PER_S = 0.03, 0.05
 START_SWITCH_G_PER_S, START_LONG_SWITCH_G_PER_S = 0.01, 0.015
 LEAST_SWITCH_G = 1e-4  # of a masked stage
-START_HALF_STEPS = 6  # of the funnel, half of those a stage has
+START_QUARTER_STEPS = 12  # of the funnel, a quarter of those a stage has
 
 
 @dataclass(frozen=True)
@@ -36,10 +36,15 @@ class Multipliers:
     heat: Floats
 
     def towards(self, other: "Multipliers", share: float) -> "Multipliers":
-        """Return the point that far on the way to another; signs stay right, being convex."""
+        """Return the point that far on the way to another.
+
+        A multiplier of the coolant ends at 0 where it would change its sign: beyond, it is that of
+        the other limit, of which the way knows nothing.
+        """
+        heat = self.heat + share * (other.heat - self.heat)
         return Multipliers(
             self.charge + share * (other.charge - self.charge),
-            self.heat + share * (other.heat - self.heat),
+            np.where(self.heat * heat < 0.0, 0.0, heat),
         )
 
 
@@ -258,7 +263,9 @@ def _chain(width: Floats, difference: Floats, low: Floats, high: Floats, on_now:
     after_low, after_high = np.append(low[1:], 0.0), np.append(high[1:], 0.0)
     offset = difference - 0.5 * width
     offset[0] += first
-    share = funnel(offset, width, after_low, after_high, steps=START_HALF_STEPS * len(width) // 2)
+    share = funnel(
+        offset, width, after_low, after_high, steps=START_QUARTER_STEPS * len(width) // 4
+    )
     edge, edges = 0.0, [first]
     terms = zip(offset, width * share, after_low, after_high, strict=True)
     for known, more, at_least, at_most in terms:

@@ -25,6 +25,7 @@ def funnel(
     decay: Floats | None = None,
     *,
     steps: int,
+    beyond: Floats | None = None,
 ) -> Floats:
     """Return the price of each term of a running sum.
 
@@ -39,13 +40,15 @@ def funnel(
     limits so far is kept; where a new limit empties it, the stretch ends at the limit that made U
     (or L), which fixes its price, and the walk starts again from there. A limit that no price can
     move is passed over. The stretch ends at once where a limit leaves one price alone. Where the
-    steps do not suffice the last stretch has the price that meets the limits seen.
+    steps do not suffice the last stretch has the price that meets the limits seen, or those that
+    are given.
 
     Parameters
     ----------
     offset, response, low, high : shape (n,); response >= 0, low <= high
     decay : d_k > 0, shape (n,); 1 if None
     steps : of the walk; going back to where a stretch ends costs some
+    beyond : prices of the terms after the last stretch that a walk cut short has ended, shape (n,)
 
     Returns
     -------
@@ -63,13 +66,17 @@ def funnel(
         [*(1.0 / decays).tolist(), 1.0],
         strict=True,
     )
-    ends = _ends([Term(*term) for term in terms], steps)
-    price, found = 0.0, []
-    for k in range(count - 1, -1, -1):
+    ends, rest = _ends([Term(*term) for term in terms], steps)
+    reached = count
+    if beyond is not None and count not in ends:
+        reached, rest = 1 + max(ends, default=-1), 0.0
+    price, found = rest, []
+    for k in range(reached - 1, -1, -1):
         price = ends.get(k, price)
         found.append(price)
         price *= decays[k]
-    return np.array(found[::-1])
+    prices = np.array(found[::-1])
+    return prices if beyond is None else np.append(prices, beyond[reached:])
 
 
 class Term(NamedTuple):
@@ -94,8 +101,8 @@ class Bound(NamedTuple):
 NO_BOUND = Bound(0, 0.0, 0.0)
 
 
-def _ends(terms: list[Term], steps: int) -> dict[int, float]:
-    """Prices of the stretches, each at its last term."""
+def _ends(terms: list[Term], steps: int) -> tuple[dict[int, float], float]:
+    """Prices of the stretches, each at its last term, and that of the last if it does not end."""
     last = len(terms) - 1
     ends: dict[int, float] = {}
     k, x, moves = 0, 0.0, 0.0
@@ -125,6 +132,4 @@ def _ends(terms: list[Term], steps: int) -> dict[int, float]:
         k, x, moves, least, most = end.at + 1, end.x, 0.0, -UNLIMITED, UNLIMITED
         if k > last:
             break
-    else:
-        ends.setdefault(last - 1, max(least, min(most, 0.0)))
-    return ends
+    return ends, max(least, min(most, 0.0))

@@ -13,7 +13,7 @@ from qpmpc.costate.program import Program
 
 Floats = NDArray[np.float64]
 
-CHARGE_HALF_STEPS, HEAT_HALF_STEPS = 6, 3  # of the funnels, half of those a term has
+CHARGE_QUARTER_STEPS, HEAT_QUARTER_STEPS = 11, 5  # of the funnels, a quarter of a term
 LEAST_RISE_G = 1e-7  # of the dual: less is as good as none
 BACKGROUND = 0.05  # share of a switch's curvature that a stage has that does not respond now
 MODERATE = 0.15  # of the engine's power
@@ -23,6 +23,8 @@ AT_SLACK = 0.999  # of the slack's price: from there on a coolant limit is given
 # there, or did not.
 FIRST_SHARE, MOST_SHARE, GROWS, SHRINKS = 1.0, 16.0, 2.0, 0.25
 STREAK = 3  # rounds in a row that have to rise before more than the whole way is tried
+# What a round moves; after one that did not rise the next in this order.
+BOTH, CHARGE, HEAT = range(3)
 
 
 def newton(
@@ -36,8 +38,10 @@ def newton(
 
     A round aims at the solution of the linearised problem and tries one point on the way there, or
     beyond it: it goes there if the dual's value, which is a lower bound on the program, is higher.
-    The next round tries the same part of its way or more, else less. So no step size has to be
-    chosen, and every round is the same work.
+    The next round tries the same part of its way or more, else less, and of the multipliers those
+    of SOC alone, or of the coolant alone, in turn: where one switch has to keep both limits, the
+    aim for one of them may be good and that for both not. So no step size has to be chosen, and
+    every round is the same work.
 
     Parameters
     ----------
@@ -48,18 +52,19 @@ def newton(
     on_round : called with the dual before each round
     """
     here = dual(program, start)
-    share, streak = FIRST_SHARE, 0
+    share, streak, moved = FIRST_SHARE, 0, BOTH
     for _ in range(rounds):
         if on_round is not None:
             on_round(here)
-        goal = aim(program, here, most_charge)
+        goal = aim(program, here, most_charge, moved)
         there = dual(program, with_signs(here.at.towards(goal, share), program.slack_g_per_k))
         if there.value - here.value > LEAST_RISE_G:
-            here, streak = there, min(streak + 1, STREAK)
+            here, streak, moved = there, min(streak + 1, STREAK), BOTH
             if streak == STREAK or share < 1.0:
                 share = min(GROWS * share, MOST_SHARE)
         else:
-            share, streak = SHRINKS * min(share, 1.0), 0
+            streak, moved = 0, (moved + 1) % 3
+            share = SHRINKS * min(share, 1.0)
     return here
 
 
@@ -69,8 +74,11 @@ def moderate(curves: Curves) -> tuple[float, float]:
     return float(power_w[0]), float(curves.fuel_g_per_s(power_w)[0])
 
 
-def aim(program: Program, here: Dual, most_charge: float) -> Multipliers:
-    """Solve the problem linearised at a point, first for SOC, then for the coolant."""
+def aim(program: Program, here: Dual, most_charge: float, moved: int = BOTH) -> Multipliers:
+    """Solve the problem linearised at a point, first for SOC, then for the coolant.
+
+    Or for one of them, with the multipliers of the other as they are.
+    """
     p, at = program, here.at
     # of a stage that does not respond now: of switching an engine at a moderate power
     moderate_w, fuel = moderate(p.curves)
@@ -83,9 +91,11 @@ def aim(program: Program, here: Dual, most_charge: float) -> Multipliers:
     last = np.append(first[1:], len(of_charge)) - 1
     low, high = (p.soc_low - here.soc)[last], (p.soc_high - here.soc)[last]
     response, offset = (np.add.reduceat(x, first) for x in (of_charge, -of_charge * at.charge))
-    price = funnel(offset, response, low, high, steps=CHARGE_HALF_STEPS * len(first) // 2)
+    price = funnel(offset, response, low, high, steps=CHARGE_QUARTER_STEPS * len(first) // 4)
     charge = np.repeat(np.clip(price, 0.0, most_charge), last + 1 - first)
-    return Multipliers(charge, _heat(p, here, of_heat, charge))
+    if moved == HEAT:
+        charge = at.charge
+    return Multipliers(charge, at.heat if moved == CHARGE else _heat(p, here, of_heat, charge))
 
 
 def _heat(program: Program, here: Dual, of_heat: Floats, charge: Floats) -> Floats:
@@ -93,19 +103,25 @@ def _heat(program: Program, here: Dual, of_heat: Floats, charge: Floats) -> Floa
 
     How much T_k moves is a running sum, with the decay of a stage. Its price is
     M_k = nu_k t_end_k, but for a known part of `price_t`. A limit whose multiplier is the price of
-    its slack, and is not kept all the same, is a limit no more.
+    its slack, and is not kept all the same, is a limit no more. One that has a multiplier now is
+    aimed at, from either side: so a stretch ends there at once, where else the walk would look for
+    a later limit up to the end of the trip and come back, from each of them. If that was wrong, the
+    multiplier changes its sign on the way, and the limit is an ordinary one in the next round.
     """
     p, slack, heat = program, program.slack_g_per_k, here.at.heat
     decay = np.maximum(-p.t_before / p.t_end, LEAST_DECAY)
     low, high = p.t_low - here.t_cl_degc, p.t_high - here.t_cl_degc
     too_cold = (heat >= AT_SLACK * slack) & (low > 0.0)
     too_hot = (heat <= -AT_SLACK * slack) & (high < 0.0)
-    given = slack * (too_cold.astype(float) - too_hot)
+    low, high = np.where(heat < 0.0, high, low), np.where(heat > 0.0, low, high)
     low, high = np.where(too_cold, -inf, low), np.where(too_hot, inf, high)
+    given = slack * (too_cold.astype(float) - too_hot)
     more = here.cross_curvature * (charge - here.at.charge)
     response = of_heat / p.t_end**2
-    offset = more / p.t_end + response * _sums(given - heat, decay)
-    price = funnel(offset, response, low, high, decay, steps=HEAT_HALF_STEPS * len(decay) // 2)
+    now = _sums(heat - given, decay)
+    offset = more / p.t_end - response * now
+    steps = HEAT_QUARTER_STEPS * len(decay) // 4
+    price = funnel(offset, response, low, high, decay, steps=steps, beyond=now)
     jump = price - np.append(decay[1:] * price[1:], 0.0)
     found: Floats = np.clip(jump + given, -slack, slack)
     return found

@@ -104,19 +104,19 @@ def test_the_funnel_takes_the_steps_of_python(library, data):
     offset, response = rng.uniform(-1, 1, n), rng.uniform(0, 2, n) * (rng.random(n) < 0.7)
     low = np.where(rng.random(n) < 0.5, -1e3, rng.uniform(-2, 0, n))
     high = np.where(low < -10, 1e3, low + rng.uniform(0, 2, n) * (rng.random(n) < 0.8))
-    decay = rng.uniform(0.3, 1, n)
+    decay, beyond = rng.uniform(0.3, 1, n), rng.uniform(-3, 3, n)
 
     def prices(walk, decay):
-        """Columns of a term: offset, response, two limits, two bounds, decay, price."""
-        bounds = np.zeros((2, n))
-        rows = np.vstack([offset, response, low, high, bounds, decay, np.full(n, NO_PRICE)]).T
-        terms = np.zeros((library.values.sizes.stages + 2, 8))
+        """Columns of a term: offset, response, limits, two bounds, decay, beyond, price."""
+        of_road = offset, response, low, high
+        rows = np.vstack([*of_road, np.zeros((2, n)), decay, beyond, np.full(n, NO_PRICE)]).T
+        terms = np.zeros((library.values.sizes.stages + 2, rows.shape[1]))
         terms[:n] = rows
         walk(terms.ctypes.data_as(ctypes.c_void_p), n, steps)
         return terms[:n, -1]
 
     found = prices(library.functions.mpc_costate_funnel_decaying, decay)
-    expected = funnel(offset, response, low, high, decay, steps=steps)
+    expected = funnel(offset, response, low, high, decay, steps=steps, beyond=beyond)
     np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8)
     found = prices(library.functions.mpc_costate_funnel, np.ones(n))
     expected = funnel(offset, response, low, high, steps=steps)

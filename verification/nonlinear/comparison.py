@@ -16,8 +16,7 @@ from qpmpc.controllers.receding_horizon import RecedingHorizon
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.qp.rows import Var
 from qpmpc.trip import Observation, Trip
-from qpmpc.vehicle.engine import alpha, optimal_line
-from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.verification.nonlinear.driven_plan import PlanDriver
 from qpmpc.verification.nonlinear.mh_nlp import MhNlp
 from qpmpc.verification.nonlinear.problem import NlpVar
 from qpmpc.verification.nonlinear.solver import NlpPlan
@@ -39,7 +38,8 @@ class PlanPair:
     soc_difference : largest difference of the predicted SOC, over all stages
     t_cl_difference_k : the same of the coolant, up to the last stage in which fuel is planned;
         after it heat has no use, and the QP leaves it undetermined
-    qp_fuel_g, nlp_fuel_g : planned fuel to arrival
+    qp_fuel_g, nlp_fuel_g : fuel to arrival of both plans, driven on the exact maps, with that of
+        starts; SOC at arrival priced by the costate of the nonlinear program
     """
 
     step: int
@@ -111,13 +111,15 @@ class NlpComparison:
         }
 
 
-def _pair(vehicle: Vehicle, seen: Observation, qp: QpPlan, nlp: NlpPlan) -> PlanPair:
+def _pair(driver: PlanDriver, seen: Observation, qp: QpPlan, nlp: NlpPlan) -> PlanPair:
     h = qp.stages.duration_s
     soc = np.abs(qp.x[:, Var.SOC] - nlp.x[:, NlpVar.SOC])
     t_cl = np.abs(qp.x[:, Var.T_CL] - nlp.x[:, NlpVar.T_CL])
     sigma = nlp.x[:, NlpVar.ON]
     power = np.array([nlp.power_on_w(stage) for stage in range(len(h))])
-    nlp_rate = sigma * optimal_line(vehicle.engine).fuel(power)
+    qp_end = driver.drive(qp.stages, seen, qp.x[:, Var.ON], qp.x[:, Var.P_ENG])
+    nlp_end = driver.drive(nlp.stages, seen, sigma, sigma * power)
+    soc_end = qp_end.soc_end - nlp_end.soc_end
     counts = h > 0.0
     burning = np.flatnonzero(counts & (sigma > ON_LEAST))
     warmed = slice(0, 1 + (int(burning[-1]) if burning.size else 0))
@@ -129,17 +131,9 @@ def _pair(vehicle: Vehicle, seen: Observation, qp: QpPlan, nlp: NlpPlan) -> Plan
         nlp_power_w=float(sigma[0] * power[0]),
         soc_difference=float(soc[counts].max()),
         t_cl_difference_k=float(t_cl[warmed].max()),
-        qp_fuel_g=_fuel_g(vehicle, h, qp.x[:, Var.T_CL], qp.x[:, Var.FUEL], seen.t_cl_degc),
-        nlp_fuel_g=_fuel_g(vehicle, h, nlp.x[:, NlpVar.T_CL], nlp_rate, seen.t_cl_degc),
+        qp_fuel_g=qp_end.fuel_g - nlp.soc_costate_g * soc_end,
+        nlp_fuel_g=nlp_end.fuel_g,
     )
-
-
-def _fuel_g(
-    vehicle: Vehicle, h: Floats, t_cl_degc: Floats, hot_g_per_s: Floats, now_degc: float
-) -> float:
-    """Planned fuel, sum h alpha(T) F with T the mean over the stage."""
-    mean = 0.5 * (t_cl_degc + np.concatenate([[now_degc], t_cl_degc[:-1]]))
-    return float(np.sum(h * alpha(vehicle.cold_engine, mean) * hot_g_per_s))
 
 
 def compare_open_loop(
@@ -153,6 +147,7 @@ def compare_open_loop(
         If CasADi is not installed.
     """
     driver, nlp = MhQp(trip, settings), MhNlp(trip, settings)
+    plans = PlanDriver(nlp.solver.problem, nlp.short_stages)
     nlp.depart(trip.start)
     pairs: list[PlanPair] = []
     unsolved = 0
@@ -163,7 +158,7 @@ def compare_open_loop(
         if seen.step % every == 0 and qp is not None and not decision.fallback:
             beside = nlp.solve(seen)
             if beside.solved:
-                pairs.append(_pair(trip.vehicle, seen, qp, beside))
+                pairs.append(_pair(plans, seen, qp, beside))
             else:
                 unsolved += 1
 

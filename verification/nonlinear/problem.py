@@ -38,6 +38,7 @@ class NlpVar(IntEnum):
 
 UNIT = np.array([0.01, 1.0, 10e3, 1.0, 1.0, 1.0])
 
+SOC_GAIN_ROW = 0  # of the rows of a stage, the change of SOC
 SOC_ROW = 2  # of the rows of a stage, the limit that may have to give way
 T_CL_ROW = 3  # the lower limit of the coolant, which the trip ahead may raise
 SIGMA_LEAST = 1e-4  # keeps the power of an engine that is off at its best value
@@ -116,7 +117,7 @@ class NlpProblem:
         parts = []
         for inside, steps in ((slice(short_stages), 1), (slice(short_stages, n), THERMOSTAT_STEPS)):
             if count := len(range(n)[inside]):
-                stage = self._stage(steps).map(count)
+                stage = self.stage(steps).map(count)
                 parts.append(stage(before[:, inside], x[:, inside], road[:, inside]))
         fuel_g, soc_gain, t_cl_gap = (ca.horzcat(*part) for part in zip(*parts, strict=True))
         sigma = x[NlpVar.ON, :]
@@ -154,8 +155,12 @@ class NlpProblem:
         least += heat_reserve_k(self.vehicle, self._maps.line)
         self._floor = CoolantFloor(self.vehicle, self._maps.line, energy_j, least)
 
-    def _stage(self, thermostat_steps: int) -> Any:
-        """One stage: (SOC and T before, variables, road) -> fuel g, SOC surplus, coolant gap."""
+    def stage(self, thermostat_steps: int) -> Any:
+        """CasADi's function of a stage: (SOC and T before, variables, road) -> fuel, SOC, T.
+
+        Fuel in g, without that of starts; what SOC is above the variable, and T of the coolant, K.
+        All in SI units; the road's fields are those of `data`.
+        """
         ca, maps, vehicle = casadi(), self._maps, self.vehicle
         th = vehicle.thermal
         before, x, road = (

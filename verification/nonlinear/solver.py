@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from qpmpc.preview.stages import Stages
 from qpmpc.verification.nonlinear.maps import casadi
-from qpmpc.verification.nonlinear.problem import UNIT, NlpData, NlpProblem, NlpVar
+from qpmpc.verification.nonlinear.problem import SOC_GAIN_ROW, UNIT, NlpData, NlpProblem, NlpVar
 
 Floats = NDArray[np.float64]
 
@@ -73,6 +73,13 @@ class NlpPlan:
         """Engine power of a stage while the engine is on."""
         above = self.x[stage, NlpVar.ABOVE] / self.x[stage, NlpVar.ON]
         return float(self.power_least_w[stage] + above)
+
+    @property
+    def soc_costate_g(self) -> float:
+        """Fuel that more SOC at arrival would save, g per unit: the dual of its last equation."""
+        rows = self.row_duals.reshape(len(self.z), -1)
+        last = int(np.flatnonzero(self.stages.duration_s > 0.0)[-1])
+        return float(-rows[last, SOC_GAIN_ROW] / UNIT[NlpVar.SOC])
 
     def shifted(self, source: NDArray[np.intp]) -> "NlpPlan":
         """Return the start for the next step: slot i takes the values of slot `source[i]`."""
