@@ -8,7 +8,7 @@ import typer
 from qpmpc.cli.options import SetOption, VehicleOption
 
 if TYPE_CHECKING:
-    from qpmpc.codegen.fmu.parts import Part
+    from qpmpc.codegen.parts.part import Part
 
 
 def fmu(
@@ -59,9 +59,9 @@ def fmu(
     from qpmpc.cli.inputs import load_vehicle_and_settings
     from qpmpc.codegen.fmu.description import FMIS, VERSION
     from qpmpc.codegen.fmu.export import checked_name, export_fmu
-    from qpmpc.codegen.fmu.parts import controller_part, plant_part
     from qpmpc.codegen.generate import PRECISIONS, one_of
     from qpmpc.codegen.method import GENERATED
+    from qpmpc.codegen.parts.part import controller_part, plant_part
     from qpmpc.errors import InputError
     from qpmpc.registry import is_of_vehicle, without_effect
     from qpmpc.settings import parse_settings
