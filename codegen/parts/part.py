@@ -34,7 +34,8 @@ class Part:
 
     Attributes
     ----------
-    description : in one line
+    what : it is, in words that may stand in a comment of C
+    of_trip : goes on with the name of its trip, a user's text; empty if it knows none
     variables : by value reference
     sources : all C files by name but those of the tool that simulates
     notice : licence
@@ -42,12 +43,18 @@ class Part:
     precision : of its arithmetic
     """
 
-    description: str
+    what: str
+    of_trip: str
     variables: list[Variable]
     sources: dict[str, str]
     notice: str
     trip_s: int | None
     precision: Precision = "f64"
+
+    @property
+    def description(self) -> str:
+        """What it is and which trip it knows, in one line."""
+        return f"{self.what}{self.of_trip}"
 
 
 def controller_part(
@@ -78,8 +85,8 @@ def controller_part(
     certificate = values.costate is not None
     variables = controller_variables(trip.vehicle, values.learning, certificate)
     return Part(
-        f"Controller {controller} of {values.vehicle}, {precision}, which knows the trip "
-        f"{shown(trip.cycle.name)}",
+        f"Controller {controller} of {values.vehicle}, {precision}",
+        f", which knows the trip {shown(trip.cycle.name)}",
         variables,
         sources | _of_variables(variables, trip.steps, method.prepared),
         files["NOTICE"],
@@ -100,7 +107,8 @@ def plant_part(vehicle: Vehicle, trip: Trip | None = None) -> Part:
     driving = "" if trip is None else f", which drives the trip {shown(trip.cycle.name)}"
     variables, trip_s = plant_variables(vehicle, trip is not None), trip and trip.steps
     return Part(
-        f"Plant of {vehicle.name}{driving}",
+        f"Plant of {vehicle.name}",
+        driving,
         variables,
         sources | _of_variables(variables, trip_s),
         template_text("NOTICE_plant.j2"),

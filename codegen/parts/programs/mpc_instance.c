@@ -140,8 +140,8 @@ int32_t mpc_instance_step(mpc_instance *instance, double from_s, double step_s)
         status =
             refused(instance, MPC_ERROR, "step size %.9g s: it must be %.9g s", step_s, STEP_S);
     } else if (!(fabs(from_s - now_s) <= TIME_TOLERANCE_S)) {
-        status = refused(instance, MPC_ERROR,
-                         "communication point %.9g s: this instance is at %.9g s", from_s, now_s);
+        status = refused(instance, MPC_ERROR, "step at %.9g s: this instance is at %.9g s", from_s,
+                         now_s);
     } else if (mpc_instance_has_arrived(instance) != 0) {
         status = refused(instance, MPC_DISCARD, "step at %.9g s: the trip has ended, at %.9g s",
                          from_s, now_s);

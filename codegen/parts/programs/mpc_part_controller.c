@@ -5,8 +5,12 @@
 #include "mpc_instance.h"
 #include "mpc_trip.h"
 
+static const mpc_road trip = {trip_demand_w, trip_speed_mps, MPC_TRIP_S};
+
 static void fill(mpc_instance_state *state, mpc_in *in)
 {
+    state->part.forecast.trip =
+        trip; /* a saved state may come back where this code lies elsewhere */
     (void)mpc_in_from_forecast(&state->part.forecast, state->seconds, in);
     in->soc = (mpc_real)state->value[MPC_VALUE_SOC];
     in->t_cl_degc = (mpc_real)state->value[MPC_VALUE_T_CL_DEGC];
@@ -25,7 +29,6 @@ void mpc_part_first(mpc_instance_state *state)
 
 int32_t mpc_part_start(mpc_instance_state *state, char *message)
 {
-    static const mpc_road trip = {trip_demand_w, trip_speed_mps, MPC_TRIP_S};
     int32_t status = MPC_OK;
     mpc_init(&state->part.controller);
     if (mpc_forecast_start(&state->part.forecast, &trip) != 0) {
