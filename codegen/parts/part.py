@@ -105,7 +105,8 @@ def plant_part(vehicle: Vehicle, trip: Trip | None = None) -> Part:
         else _road(trip.truth, "double", "f64")
     )
     driving = "" if trip is None else f", which drives the trip {shown(trip.cycle.name)}"
-    variables, trip_s = plant_variables(vehicle, trip is not None), trip and trip.steps
+    variables = plant_variables(vehicle, trip is not None)
+    trip_s = None if trip is None else trip.steps
     return Part(
         f"Plant of {vehicle.name}",
         driving,

@@ -33,8 +33,8 @@ class Model:
         return shown
 
 
-# f64: to rounding. f32: as the preview's sums round in another order than Python's and the optimum is
-# flat, 27 W of 10 kW here
+# f64: to rounding. f32: the preview's sums round in another order than Python's, and the optimum is
+# flat: 27 W of 10 kW here
 @pytest.mark.parametrize(("name", "within"), [("qp", 1e-8), ("costate", 0.005)])
 def test_two_blocks_are_simulate(blocks, trip, name, within):
     host = "mh-qp" if name == "qp" else GeneratedCostate(trip, precision="f32")
