@@ -4,6 +4,9 @@ import ctypes
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from qpmpc.codegen.c_compiler import made_by
 from qpmpc.codegen.kept_library import kept_library
 from qpmpc.codegen.parts.part import Part
@@ -52,12 +55,18 @@ def library_of(part: Part, name: str) -> ctypes.CDLL:
         " ".join(flags),
         lambda command, _: made_by(command, files, [*flags, *sources, "-lm"]),
     )
-    library = ctypes.CDLL(str(kept.file))
+    return loaded(kept.file)
+
+
+def loaded(file: Path) -> ctypes.CDLL:
+    """Load a compiled S-function."""
+    library = ctypes.CDLL(str(file))
     for function in ("stub_get", "stub_sample_time_s"):
         getattr(library, function).restype = ctypes.c_double
     for function in ("stub_error", "stub_warning"):
         getattr(library, function).restype = ctypes.c_char_p
-    library.stub_block.restype = ctypes.c_void_p
+    for function in ("stub_block", "stub_memory"):
+        getattr(library, function).restype = ctypes.c_void_p
     return library
 
 
@@ -106,6 +115,14 @@ class Block:
     def get(self, *names: str) -> list[float]:
         """Return outputs by name."""
         return [self._library.stub_get(self._block, self._port[name]) for name in names]
+
+    def memory(self) -> NDArray[np.uint64]:
+        """Return the block's work vector itself, as words."""
+        words = self._library.stub_words(self._block)
+        kind = ctypes.POINTER(ctypes.c_uint64)
+        return np.ctypeslib.as_array(
+            ctypes.cast(self._library.stub_memory(self._block), kind), (words,)
+        )
 
     def about(self, side: str) -> list[dict[str, Any]]:
         """Return width, type and feedthrough of all ports of a side, in order."""

@@ -1,10 +1,12 @@
 """S-functions of controller and plant, in Simulink's order of calls, are `qpmpc simulate`."""
 
+import shutil
 from math import nan
+from pathlib import Path
 
 import numpy as np
 import pytest
-from s_functions import MxArray, number
+from s_functions import Block, MxArray, loaded, number
 
 from qpmpc import simulate
 from qpmpc.codegen.costate_controller import GeneratedCostate
@@ -84,6 +86,27 @@ def test_blocks_side_by_side_are_as_alone(blocks, name):
         model = Model(*again)
         assert [model.second(float(t)) for t in seconds] == alone[0]
     assert [list(each) for each in zip(*both, strict=True)] == alone
+
+
+def test_a_saved_state_does_not_lead_back_to_where_it_was_saved(blocks, tmp_path):
+    """As of an operating point that another session restores, where the code lies elsewhere."""
+    here = blocks.library("costate")
+    there = loaded(Path(shutil.copy(here._name, tmp_path / "elsewhere.so")))
+    part, measured = blocks.part("costate"), {"soc": 0.6, "t_cl_degc": 50.0}
+    with Block(here, part) as one, Block(there, part) as other:
+        for block in (one.start(), other.start()):
+            block.set(**measured)
+            block.outputs(0.0)
+            block.update(0.0)
+        (pointers,) = np.nonzero(one.memory() != other.memory())
+        own = other.memory()[pointers]
+        assert len(pointers) == 2  # to the trip's demand and speed
+        other.memory()[:] = one.memory()
+        for block in (one, other):
+            block.outputs(1.0)
+            block.update(1.0)
+        assert (other.memory()[pointers] == own).all()
+        assert (np.delete(other.memory(), pointers) == np.delete(one.memory(), pointers)).all()
 
 
 def test_outputs_asked_for_again_follow_the_last_inputs(blocks):

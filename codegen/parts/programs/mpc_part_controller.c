@@ -9,8 +9,8 @@ static const mpc_road trip = {trip_demand_w, trip_speed_mps, MPC_TRIP_S};
 
 static void fill(mpc_instance_state *state, mpc_in *in)
 {
-    state->part.forecast.trip =
-        trip; /* a saved state may come back where this code lies elsewhere */
+    /* a saved state may come back where this code lies elsewhere */
+    state->part.forecast.trip = trip;
     (void)mpc_in_from_forecast(&state->part.forecast, state->seconds, in);
     in->soc = (mpc_real)state->value[MPC_VALUE_SOC];
     in->t_cl_degc = (mpc_real)state->value[MPC_VALUE_T_CL_DEGC];

@@ -106,6 +106,8 @@ double stub_sample_time_s(const SimStruct *S)
 {
     return (S->offset_s == 0.0) ? S->sample_time_s : -1.0;
 }
+void *stub_memory(const SimStruct *S) { return S->dwork[0].memory; }
+int stub_words(const SimStruct *S) { return S->dwork[0].width; }
 const char *stub_error(const SimStruct *S) { return S->error; }
 const char *stub_warning(const SimStruct *S) { return S->warning; }
 int stub_stop_requested(const SimStruct *S) { return S->stop_requested; }
