@@ -25,6 +25,19 @@ static int32_t is_stage(mpc_real duration_s, mpc_real speed_mps, mpc_real must_s
            & within(rise_j, REAL(0.0), mpc_par.can_energy_j);
 }
 
+/* Whether the means over the seconds with a choice are those over all, where all have one. */
+static int32_t tells_free_means(const mpc_in *in, int32_t k)
+{
+    const mpc_real net_w = in->long_net_w[k];
+    const mpc_real off_w = in->long_internal_off_w[k];
+    const int32_t same =
+        within(in->long_free_net_w[k], net_w - SAME_MEAN_W, net_w + SAME_MEAN_W)
+        & within(in->long_free_internal_off_w[k], off_w - SAME_MEAN_W, off_w + SAME_MEAN_W);
+    const int32_t has_choice =
+        ((in->long_must_share[k] <= REAL(0.0)) && (in->long_duration_s[k] > REAL(0.0))) ? 1 : 0;
+    return (has_choice != 0) ? same : 1;
+}
+
 static int32_t is_possible(const mpc_in *in)
 {
     int32_t fine = ((in->short_count >= 1) && (in->short_count <= MPC_SHORT)) ? 1 : 0;
@@ -37,6 +50,7 @@ static int32_t is_possible(const mpc_in *in)
                          in->long_rises[k], in->long_fall_j[k], in->long_rise_j[k]);
         fine &= are_powers(in->long_net_w[k], in->long_internal_off_w[k]);
         fine &= are_powers(in->long_free_net_w[k], in->long_free_internal_off_w[k]);
+        fine &= tells_free_means(in, k);
     }
     return fine;
 }

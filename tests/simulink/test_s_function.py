@@ -52,6 +52,7 @@ def test_two_blocks_are_simulate(blocks, trip, name, within):
         assert plant.get("fuel_total_g")[0] == pytest.approx(run.fuel_g.sum(), rel=within)
         assert controller.warning is plant.warning is None
     assert run.fuel_g.sum() > 50.0
+    assert not found[:, 6:].any()  # flags, rungs
     found = np.vstack([found[:, :5], end])
     expected = np.column_stack(
         [
