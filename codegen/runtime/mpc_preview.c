@@ -25,22 +25,21 @@ static int32_t is_stage(mpc_real duration_s, mpc_real speed_mps, mpc_real must_s
            & within(rise_j, REAL(0.0), mpc_par.can_energy_j);
 }
 
-/* Whether the means over the seconds with a choice are those over all, where all have one. */
-static int32_t tells_free_means(const mpc_in *in, int32_t k)
+/* Energy, J, by which the means over the seconds with a choice differ from those over all, where all
+ * have one: 0 but for rounding, if the caller knows them. */
+static mpc_real untold_j(const mpc_in *in, int32_t k)
 {
-    const mpc_real net_w = in->long_net_w[k];
-    const mpc_real off_w = in->long_internal_off_w[k];
-    const int32_t same =
-        within(in->long_free_net_w[k], net_w - SAME_MEAN_W, net_w + SAME_MEAN_W)
-        & within(in->long_free_internal_off_w[k], off_w - SAME_MEAN_W, off_w + SAME_MEAN_W);
-    const int32_t has_choice =
-        ((in->long_must_share[k] <= REAL(0.0)) && (in->long_duration_s[k] > REAL(0.0))) ? 1 : 0;
-    return (has_choice != 0) ? same : 1;
+    const mpc_real apart_w =
+        REAL_ABS(in->long_free_net_w[k] - in->long_net_w[k])
+        + REAL_ABS(in->long_free_internal_off_w[k] - in->long_internal_off_w[k]);
+    return (in->long_must_share[k] > REAL(0.0)) ? REAL(0.0) : (in->long_duration_s[k] * apart_w);
 }
 
 static int32_t is_possible(const mpc_in *in)
 {
     int32_t fine = ((in->short_count >= 1) && (in->short_count <= MPC_SHORT)) ? 1 : 0;
+    mpc_real total_s = REAL(0.0);
+    mpc_real apart_j = REAL(0.0);
     fine &= within(in->short_rise_j, REAL(0.0), mpc_par.can_energy_j);
     for (int32_t k = 0; k < MPC_SHORT; k++) {
         fine &= mpc_check_second(in->short_demand_w[k], in->short_speed_mps[k]);
@@ -50,8 +49,10 @@ static int32_t is_possible(const mpc_in *in)
                          in->long_rises[k], in->long_fall_j[k], in->long_rise_j[k]);
         fine &= are_powers(in->long_net_w[k], in->long_internal_off_w[k]);
         fine &= are_powers(in->long_free_net_w[k], in->long_free_internal_off_w[k]);
-        fine &= tells_free_means(in, k);
+        total_s += in->long_duration_s[k];
+        apart_j += untold_j(in, k);
     }
+    fine &= within(apart_j, REAL(0.0), SAME_MEANS_W * total_s);
     return fine;
 }
 

@@ -16,7 +16,7 @@ from qpmpc.vehicle.capability import Capability
 from qpmpc.vehicle.plant import Plant
 
 LONGEST_STAGE_S = 1e5
-SAME_MEAN_W = 1.0  # two means of the same seconds differ by no more, in single precision too
+SAME_MEANS_W = 1.0  # means of the same seconds differ by no more, in single precision too
 NEWS = 0.2  # share of a preview that may change from one second to the next
 
 
@@ -152,12 +152,10 @@ def _tells_free_means(long: Stages) -> bool:
 
     A caller in C who does not know them leaves them at 0.
     """
-    free = (long.must_share <= 0.0) & (long.duration_s > 0.0)
-    net_w = (long.free_net_w - long.net_w)[free]
-    internal_w = (long.free_internal_off_w - long.internal_off_w)[free]
-    return _within(net_w, -SAME_MEAN_W, SAME_MEAN_W) and _within(
-        internal_w, -SAME_MEAN_W, SAME_MEAN_W
-    )
+    apart_w = np.abs(long.free_net_w - long.net_w)
+    apart_w += np.abs(long.free_internal_off_w - long.internal_off_w)
+    apart_j = (long.duration_s * apart_w)[long.must_share <= 0.0].sum()
+    return bool(apart_j <= SAME_MEANS_W * long.duration_s.sum())
 
 
 def _is_same(one: Preview, other: Preview) -> bool:
