@@ -5,7 +5,7 @@
 
 #define STEP_S 1.0
 
-/* How many variables have a role; how many of these come before one of them, which is its port. */
+/* How many of the first `before` variables have a role: that one's port, or their number in all. */
 static int_T count_of(int32_t role, int32_t before)
 {
     int_T count = 0;
