@@ -214,7 +214,7 @@ def literals(array: NDArray[np.float64], precision: Precision) -> list[str]:
     return [", ".join(texts[i : i + VALUES_A_LINE]) for i in cuts]
 
 
-def template_text(name: str, **context: Any) -> str:
+def template_text(name: str, /, **context: Any) -> str:
     """Return a template of this package, filled in."""
     return _environment().get_template(name).render(context)
 

@@ -44,7 +44,7 @@ CONSTANTS_OF_ALL = of_modules(
     (linearisation, "COLDEST_DEGC HOTTEST_DEGC DEPARTURE_FUEL_G_PER_S DEPARTURE_P_ENG_W"),
     (safety, "POWER_MARGIN_W SOC_MARGIN T_CL_MARGIN_K"),
     (monitor, "LONG_AGO_S LONGEST_GAP_S"),
-    (checked, "LONGEST_STAGE_S NEWS"),
+    (checked, "LONGEST_STAGE_S NEWS SAME_MEANS_W"),
     (swing, "NO_LIMIT_J LEAST_KEPT_J DRAIN_SHARE FILLED_SHARE"),
     (coolant_floor, "USABLE"),
     (qp_planner, "FAILURES_FORGIVEN"),

@@ -75,11 +75,7 @@ class Manifest(BaseModel):
 
 def digests(files: Mapping[str, str]) -> dict[str, str]:
     """Return the SHA-256 of each source among the files of a project, by name."""
-    return {
-        name: hashlib.sha256(text.encode()).hexdigest()
-        for name, text in sorted(files.items())
-        if re.match(_SOURCE, name)
-    }
+    return {name: _digest(text) for name, text in sorted(files.items()) if re.match(_SOURCE, name)}
 
 
 def load_manifest(folder: Path) -> Manifest:
@@ -88,11 +84,28 @@ def load_manifest(folder: Path) -> Manifest:
     Raises
     ------
     InputError
-        If the folder holds none.
+        If the folder holds none, or it names files that are no sources in it.
     """
     path = folder / NAME
     text = read_text(path, MEGABYTES_MAX, "--project ")
-    return validated(Manifest, load_toml(text, str(path)), str(path))
+    manifest = validated(Manifest, load_toml(text, str(path)), str(path))
+    for name in manifest.files:
+        if not re.match(_SOURCE, name):
+            raise InputError(f"{path}: {name!r} is no name of a source")
+    return manifest
+
+
+def _digest(source: str) -> str:
+    return hashlib.sha256(source.encode()).hexdigest()
+
+
+def is_as_written(path: Path, digest: str) -> bool:
+    """Whether a source of a project can be read and still is what its digest was made of."""
+    try:
+        source = path.read_bytes().replace(b"\r\n", b"\n")
+    except OSError:
+        return False
+    return hashlib.sha256(source).hexdigest() == digest
 
 
 def load_sources(folder: Path, manifest: Manifest) -> dict[str, str]:
@@ -105,10 +118,8 @@ def load_sources(folder: Path, manifest: Manifest) -> dict[str, str]:
     """
     prefix, sources = f"--project {folder}: ", {}
     for name, digest in manifest.files.items():
-        if not re.match(_SOURCE, name):
-            raise InputError(f"{folder / NAME}: {name!r} is no name of a source")
         source = read_text(folder / name, SOURCE_MEGABYTES_MAX, prefix).replace("\r\n", "\n")
-        if hashlib.sha256(source.encode()).hexdigest() != digest:
+        if _digest(source) != digest:
             raise InputError(
                 f"{prefix}{name} is not as it was written: make the project again, or put your "
                 "changes into replay_port.c"

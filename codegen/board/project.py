@@ -8,14 +8,22 @@ from typing import Literal
 import numpy as np
 
 from qpmpc._version import __version__
-from qpmpc.codegen.board.manifest import LONGEST_TRIP_S, NAME, Manifest, digests, load_manifest
+from qpmpc.codegen.board.again import (
+    LINKER_SCRIPT,
+    OF_QEMU,
+    OF_YOURS,
+    earlier_project,
+    is_outgrown,
+    memory_map,
+    on_edited_script,
+    remove_leftovers,
+)
+from qpmpc.codegen.board.manifest import LONGEST_TRIP_S, NAME, Manifest, digests
 from qpmpc.codegen.firmware import ICOUNT_SHIFT
 from qpmpc.codegen.generate import (
-    MEMORY_KB,
     Algorithm,
     Precision,
     algorithm_of,
-    linker_script,
     literals,
     project_files,
     template_text,
@@ -33,11 +41,8 @@ from qpmpc.trip import Observation, Trip
 BoardTarget = Literal["cortex-m7", "linux"]
 BOARD_TARGETS: tuple[BoardTarget, ...] = ("cortex-m7", "linux")
 GENERATED_FOR: dict[BoardTarget, GeneratedTarget] = {"cortex-m7": "cortex-m7", "linux": "host"}
-YOURS = ("replay_port.c", "replay.ld")  # edited by the user: kept
+YOURS = ("replay_port.c", LINKER_SCRIPT)  # edited by the user: kept
 PROGRAMS = "board/programs"
-FLASH_KB = 2048  # of many parts; the user's own is in replay.ld
-OF_YOURS = "YOURS: begin and length of\n * the memories of your part."
-OF_QEMU = "Of QEMU's board."
 NOT_KNOWN_G = -1.0
 FLAGS_A_LINE = 30
 MHZ_MIN, MHZ_MAX = 1.0, 4000.0
@@ -51,10 +56,12 @@ class Project:
     ----------
     manifest : what it is
     kept : files that were there and are the user's to edit
+    remarks : what else is said of a project that was there before
     """
 
     manifest: Manifest
     kept: list[str]
+    remarks: list[str]
 
 
 def write_project(
@@ -74,7 +81,8 @@ def write_project(
     Parameters
     ----------
     trip, settings : the trip, and settings of the controllers
-    folder : of the project; `YOURS` are kept if they are there
+    folder : of the project; `YOURS` are kept if they are there, but for a linker script that
+        nobody edited and that another controller outgrows; sources of an earlier project go
     target : a bare Cortex-M7, or Linux
     precision, algorithm, controller : to be generated
     seconds : of the trip to be replayed, from departure on; all if None
@@ -92,7 +100,11 @@ def write_project(
         raise InputError(f"--seconds must be 1 to {trip.steps}, the trip's length (given: {count})")
     core_hz = 0 if clock_mhz is None else round(checked_mhz(clock_mhz) * 1e6)
     check_folder(folder, "--project")
-    _check_target(folder, target)
+    earlier = earlier_project(folder)
+    if earlier is not None and earlier.target != target:
+        raise InputError(
+            f"--project {folder} is for {earlier.target}: use another folder for {target}"
+        )
     method = Method.of(controller, settings)
     values = method.values(trip.vehicle, method.horizon.block_count(trip.forecast.steps))
     algorithm = algorithm_of(values, algorithm)
@@ -128,14 +140,21 @@ def write_project(
     files[NAME] = manifest.text()
     files["replay_port.c"] = port
     if target == "cortex-m7":
-        memory_kb = (FLASH_KB, MEMORY_KB[algorithm, precision][1])
-        files["replay.ld"] = linker_script(algorithm, memory_kb, OF_YOURS)
-        files["replay_qemu.ld"] = linker_script(algorithm, memory_kb, OF_QEMU)
+        files[LINKER_SCRIPT] = memory_map(algorithm, precision, OF_YOURS)
+        files["replay_qemu.ld"] = memory_map(algorithm, precision, OF_QEMU)
     kept = [name for name in YOURS if name in files and (folder / name).exists()]
+    remarks = []
+    if earlier is not None and LINKER_SCRIPT in kept:
+        if is_outgrown(folder, earlier, files[LINKER_SCRIPT]):
+            kept.remove(LINKER_SCRIPT)
+        elif remark := on_edited_script(earlier, algorithm, precision):
+            remarks.append(remark)
     for name, text in files.items():
         if name not in kept:
             write_text(folder / name, text)
-    return Project(manifest, kept)
+    if earlier is not None:
+        remarks += remove_leftovers(folder, earlier, files)
+    return Project(manifest, kept, remarks)
 
 
 def checked_mhz(clock_mhz: float) -> float:
@@ -152,13 +171,6 @@ def checked_mhz(clock_mhz: float) -> float:
             f"{clock_mhz:g})"
         )
     return clock_mhz
-
-
-def _check_target(folder: Path, target: BoardTarget) -> None:
-    if (folder / NAME).exists():
-        there = load_manifest(folder).target
-        if there != target:
-            raise InputError(f"--project {folder} is for {there}: use another folder for {target}")
 
 
 def _is_compared(name: str) -> bool:

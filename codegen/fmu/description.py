@@ -6,8 +6,8 @@ from typing import Literal
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from qpmpc._version import __version__
-from qpmpc.codegen.fmu.units import UNITS
-from qpmpc.codegen.fmu.variables import Kind, Variable
+from qpmpc.codegen.parts.units import UNITS
+from qpmpc.codegen.parts.variables import Kind, Variable
 
 Fmi = Literal["2", "3"]
 FMIS: tuple[Fmi, ...] = ("2", "3")

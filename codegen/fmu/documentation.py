@@ -3,7 +3,7 @@
 from html import escape
 
 from qpmpc.codegen.fmu.description import TOOL, About
-from qpmpc.codegen.fmu.variables import Variable
+from qpmpc.codegen.parts.variables import Variable
 
 PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{name}</title></head><body>

@@ -25,9 +25,21 @@ static int32_t is_stage(mpc_real duration_s, mpc_real speed_mps, mpc_real must_s
            & within(rise_j, REAL(0.0), mpc_par.can_energy_j);
 }
 
+/* Energy, J, by which the means over the seconds with a choice differ from those over all, where all
+ * have one: 0 but for rounding, if the caller knows them. */
+static mpc_real untold_j(const mpc_in *in, int32_t k)
+{
+    const mpc_real apart_w =
+        REAL_ABS(in->long_free_net_w[k] - in->long_net_w[k])
+        + REAL_ABS(in->long_free_internal_off_w[k] - in->long_internal_off_w[k]);
+    return (in->long_must_share[k] > REAL(0.0)) ? REAL(0.0) : (in->long_duration_s[k] * apart_w);
+}
+
 static int32_t is_possible(const mpc_in *in)
 {
     int32_t fine = ((in->short_count >= 1) && (in->short_count <= MPC_SHORT)) ? 1 : 0;
+    mpc_real total_s = REAL(0.0);
+    mpc_real apart_j = REAL(0.0);
     fine &= within(in->short_rise_j, REAL(0.0), mpc_par.can_energy_j);
     for (int32_t k = 0; k < MPC_SHORT; k++) {
         fine &= mpc_check_second(in->short_demand_w[k], in->short_speed_mps[k]);
@@ -37,7 +49,10 @@ static int32_t is_possible(const mpc_in *in)
                          in->long_rises[k], in->long_fall_j[k], in->long_rise_j[k]);
         fine &= are_powers(in->long_net_w[k], in->long_internal_off_w[k]);
         fine &= are_powers(in->long_free_net_w[k], in->long_free_internal_off_w[k]);
+        total_s += in->long_duration_s[k];
+        apart_j += untold_j(in, k);
     }
+    fine &= within(apart_j, REAL(0.0), SAME_MEANS_W * total_s);
     return fine;
 }
 

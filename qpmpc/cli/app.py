@@ -22,6 +22,7 @@ from qpmpc.cli.logs import QUIET, set_log_level
 from qpmpc.cli.pil import pil
 from qpmpc.cli.reproduce import reproduce
 from qpmpc.cli.simulate import simulate
+from qpmpc.cli.simulink import simulink
 from qpmpc.cli.studies import report, studies
 from qpmpc.cli.sweep import sweep
 from qpmpc.cli.trips import trips
@@ -51,6 +52,7 @@ app.command()(benchmark)
 app.command()(codegen)
 app.command()(pil)
 app.command()(fmu)
+app.command()(simulink)
 app.command()(a2l)
 app.command()(reproduce)
 app.command()(verify)

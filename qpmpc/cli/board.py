@@ -83,7 +83,7 @@ def make(
     )
     for name in project.kept:
         console.print(f"{name} was there and is kept: it is yours to edit")
-    for remark in trip.remarks:
+    for remark in (*project.remarks, *trip.remarks):
         console.print(remark)
 
 

@@ -137,6 +137,8 @@ def pil(
         return
     if cycle is None:
         raise InputError("Missing argument 'CYCLE' (see qpmpc pil --help)")
+    if project is None and target == "linux":
+        raise InputError("--target linux is for a board of your own: it needs --project DIR")
     of_board = one_of(target, ("cortex-m7",) if project is None else BOARD_TARGETS, "target")
     name = one_of(controller, GENERATED, "generated controller")
     if name != "mh-qp" and (algorithm is not None or pareto):

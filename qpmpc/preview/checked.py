@@ -16,6 +16,7 @@ from qpmpc.vehicle.capability import Capability
 from qpmpc.vehicle.plant import Plant
 
 LONGEST_STAGE_S = 1e5
+SAME_MEANS_W = 1.0  # means of the same seconds differ by no more, in single precision too
 NEWS = 0.2  # share of a preview that may change from one second to the next
 
 
@@ -118,6 +119,7 @@ class CheckedPreview:
             and _within(long.fall_j, 0.0, can.energy_j)
             and _within(long.rise_j, 0.0, can.energy_j)
             and 0.0 <= preview.short_rise_j <= can.energy_j
+            and _tells_free_means(long)
         )
 
     def _goes_on(self, preview: Preview, step: int) -> bool:
@@ -143,6 +145,17 @@ class CheckedPreview:
             <= free_s * (can.internal_max_w - can.internal_min_w)
             and float(news_w.sum()) <= NEWS * self.settings.short_stages * can.net_max_w
         )
+
+
+def _tells_free_means(long: Stages) -> bool:
+    """Whether the means over the seconds with a choice are those over all, where all have one.
+
+    A caller in C who does not know them leaves them at 0.
+    """
+    apart_w = np.abs(long.free_net_w - long.net_w)
+    apart_w += np.abs(long.free_internal_off_w - long.internal_off_w)
+    apart_j = (long.duration_s * apart_w)[long.must_share <= 0.0].sum()
+    return bool(apart_j <= SAME_MEANS_W * long.duration_s.sum())
 
 
 def _is_same(one: Preview, other: Preview) -> bool:

@@ -158,6 +158,40 @@ def test_ports_are_kept_and_targets_do_not_mix(tmp_path) -> None:
         write_project(trip, QUICK, tmp_path, "linux")
 
 
+def test_another_controller_in_the_same_folder_leaves_nothing_of_the_first(tmp_path) -> None:
+    """No source that a vendor's project would take in, no memory that is too small."""
+    trip, mh_qp = Trip(CYCLE), {"seconds": 2, "precision": "f64"}
+    write_project(trip, QUICK, tmp_path, controller="mh-costate", seconds=2)
+    assert [*tmp_path.glob("mpc_costate_*.c")]
+    (tmp_path / "mpc_costate_aim.c").write_text("mine")
+    again = write_project(trip, QUICK, tmp_path, **mh_qp)
+    assert again.kept == ["replay_port.c"]
+    (remark,) = again.remarks
+    assert remark.startswith("mpc_costate_aim.c is of the project that was here before, edited")
+    write_project(trip, QUICK, tmp_path / "new", **mh_qp)
+    new = {path.name: path.read_text() for path in (tmp_path / "new").iterdir()}
+    here = {path.name: path.read_text() for path in tmp_path.iterdir() if path.is_file()}
+    assert here == new | {"mpc_costate_aim.c": "mine"}
+    script = (tmp_path / "replay.ld").read_text().replace("LENGTH = 2048K", "LENGTH = 1024K")
+    (tmp_path / "replay.ld").write_text(script)
+    again = write_project(trip, QUICK, tmp_path, controller="mh-costate", seconds=2)
+    assert again.kept == ["replay_port.c", "replay.ld"]
+    assert again.remarks == [
+        "replay.ld was written for admm in f64 and edited: replay_qemu.ld has what costate in f32 "
+        "needs, 64 KB of RAM; take over what differs"
+    ]
+    assert (tmp_path / "replay.ld").read_text() == script
+
+
+@pytest.mark.parametrize("name", ["../mpc.c", "/mpc.c", "osqp/../../mpc.c", "mpc.py"])
+def test_a_project_that_names_files_elsewhere_is_refused(tmp_path, name) -> None:
+    write_project(Trip(CYCLE), QUICK, tmp_path, "linux", controller="mh-costate", seconds=1)
+    manifest = tmp_path / "replay.toml"
+    manifest.write_text(manifest.read_text().replace('"mpc.h"', f'"{name}"'))
+    with pytest.raises(InputError, match="is no name of a source"):
+        write_project(Trip(CYCLE), QUICK, tmp_path, "linux", seconds=1)
+
+
 def test_the_same_settings_give_the_same_identity_on_every_board(tmp_path) -> None:
     trip = Trip(CYCLE)
     kinds: list[tuple[BoardTarget, Precision]] = [

@@ -174,11 +174,13 @@ class Raw:
         self.state = self.trip.plant.initial_state()
 
     def step(self, k: int, **spoilt: object):
-        """Run step k with some inputs replaced: a value, or (index, value) of an array."""
+        """Run step k with some inputs replaced: a value, of all of an array, or (index, value)."""
         self.controller.inputs.fill(self.trip.observation(k, self.state), self.controller._in)
         for name, value in spoilt.items():
             if isinstance(value, tuple):
                 getattr(self.controller._in, name)[value[0]] = value[1]
+            elif isinstance(of := getattr(self.controller._in, name), ctypes.Array):
+                of[:] = [value] * len(of)
             else:
                 setattr(self.controller._in, name, value)
         flags = self.library.step(*self.controller._arguments)
@@ -194,6 +196,7 @@ class Raw:
 # coolant are predicted as the plant moves, here under another command by rounding at most.
 STOOD_IN_W = 1.0
 BAD_MEASUREMENT, BAD_PREVIEW = Flag.BAD_MEASUREMENT, Flag.BAD_PREVIEW
+OF_THE_FREE = ("must_share", "free_net_w", "free_internal_off_w")
 BAD = [
     ({"soc": math.nan}, BAD_MEASUREMENT),
     ({"soc": 1.5}, BAD_MEASUREMENT),
@@ -209,6 +212,9 @@ BAD = [
     ({"long_must_share": (3, 1.5)}, BAD_PREVIEW),
     ({"long_free_net_w": (3, math.nan)}, BAD_PREVIEW),
     ({"long_free_internal_off_w": (3, 1e9)}, BAD_PREVIEW),
+    # a caller who does not know the seconds without a choice, and leaves their arrays at 0
+    ({f"long_{name}": 0.0 for name in OF_THE_FREE}, BAD_PREVIEW),
+    ({"long_free_internal_off_w": 0.0}, BAD_PREVIEW),
     ({"long_rises": (3, -1.0)}, BAD_PREVIEW),
     ({"long_rises": (3, math.nan)}, BAD_PREVIEW),
     ({"long_fall_j": (5, -1.0)}, BAD_PREVIEW),
@@ -336,6 +342,8 @@ def far_more_of_the_same(preview: Preview) -> Preview:
             duration_s=np.full_like(full, 1e5),
             net_w=full,
             internal_off_w=np.full_like(full, 2e4),
+            free_net_w=full,
+            free_internal_off_w=np.full_like(full, 2e4),
         )
     )
 

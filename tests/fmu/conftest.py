@@ -6,7 +6,7 @@ import pytest
 
 from qpmpc.codegen.c_compiler import compiler
 from qpmpc.codegen.fmu.export import export_fmu
-from qpmpc.codegen.fmu.parts import controller_part, plant_part
+from qpmpc.codegen.parts.part import controller_part, plant_part
 from qpmpc.trip import Trip
 
 pytest.importorskip("fmpy", reason="not installed: fmpy, which simulates FMUs")

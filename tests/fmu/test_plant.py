@@ -9,7 +9,7 @@ from fmpy.validation import validate_fmu
 from fmus import Unit
 
 from qpmpc.codegen.fmu.export import export_fmu
-from qpmpc.codegen.fmu.parts import plant_part
+from qpmpc.codegen.parts.part import plant_part
 from qpmpc.vehicle import Command, Plant, PlantState, load_vehicle
 
 SECONDS = 1000

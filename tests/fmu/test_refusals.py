@@ -33,7 +33,7 @@ def test_a_step_that_is_not_a_second(plant, step_s):
 
 def test_a_step_from_another_time(plant):
     plant.start(start_s=10.0)
-    refused(plant, lambda: plant.step(0.0), "communication point 0 s: this instance is at 10 s")
+    refused(plant, lambda: plant.step(0.0), "step at 0 s: this instance is at 10 s")
     plant.step(10.0)
     assert plant.get("time") == [11.0]
 

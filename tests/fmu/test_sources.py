@@ -11,7 +11,7 @@ import pytest
 
 from qpmpc.codegen.c_compiler import compiler
 from qpmpc.codegen.fmu.export import export_fmu
-from qpmpc.codegen.fmu.parts import controller_part, plant_part
+from qpmpc.codegen.parts.part import controller_part, plant_part
 from qpmpc.controllers.settings import ControllerSettings
 
 STANDARD = Path(fmpy.__file__).parent / "c-code"

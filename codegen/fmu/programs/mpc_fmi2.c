@@ -3,10 +3,11 @@
 #include <string.h>
 
 #include "mpc_fmi2.h"
-#include "mpc_fmu.h"
+#include "mpc_fmi_instance.h"
+#include "mpc_fmi_token.h"
 
 typedef struct {
-    mpc_fmu fmu;
+    mpc_instance fmu;
     fmi2CallbackFunctions functions;
     char *name;
 } instance;
@@ -15,9 +16,9 @@ typedef struct {
  * them. Warnings and errors are logged whether debug logging is on or off: there is no other kind. */
 static fmi2Status told(instance *of, int32_t status)
 {
-    if ((status != MPC_FMU_OK) && (of->functions.logger != NULL)) {
+    if ((status != MPC_OK) && (of->functions.logger != NULL)) {
         of->functions.logger(of->functions.componentEnvironment, of->name, (fmi2Status)status,
-                             mpc_fmu_categories[status], of->fmu.message);
+                             mpc_fmi_categories[status], of->fmu.message);
     }
     return (fmi2Status)status;
 }
@@ -25,7 +26,7 @@ static fmi2Status told(instance *of, int32_t status)
 fmi2Status mpc_fmi2_refuse(fmi2Component c, const char *why)
 {
     instance *const of = (instance *)c;
-    return told(of, mpc_fmu_refuse(&of->fmu, why));
+    return told(of, mpc_instance_refuse(&of->fmu, why));
 }
 
 EXPORT const char *NAME(fmi2GetTypesPlatform)(void) { return "default"; }
@@ -47,7 +48,7 @@ static fmi2Component not_made(const fmi2CallbackFunctions *functions, fmi2String
 {
     if ((functions != NULL) && (functions->logger != NULL)) {
         functions->logger(functions->componentEnvironment, name, fmi2Error,
-                          mpc_fmu_categories[fmi2Error], why);
+                          mpc_fmi_categories[fmi2Error], why);
     }
     return NULL;
 }
@@ -64,7 +65,7 @@ EXPORT fmi2Component NAME(fmi2Instantiate)(fmi2String name, fmi2Type type, fmi2S
     if (type != fmi2CoSimulation) {
         return not_made(functions, text, "this FMU is for co-simulation only");
     }
-    if ((guid == NULL) || (strcmp(guid, MPC_FMU_TOKEN) != 0)) {
+    if ((guid == NULL) || (strcmp(guid, MPC_FMI_TOKEN) != 0)) {
         return not_made(functions, text, "the GUID is not that of this FMU");
     }
     instance *const made = (instance *)calloc(1, sizeof(instance));
@@ -79,7 +80,7 @@ EXPORT fmi2Component NAME(fmi2Instantiate)(fmi2String name, fmi2Type type, fmi2S
     if (functions != NULL) {
         made->functions = *functions;
     }
-    mpc_fmu_reset(&made->fmu);
+    mpc_instance_reset(&made->fmu);
     return made;
 }
 
@@ -99,30 +100,30 @@ STATUS NAME(fmi2SetupExperiment)(fmi2Component c, fmi2Boolean has_tolerance, fmi
     (void)tolerance;
     (void)has_stop;
     (void)stop_s;
-    return told(of, mpc_fmu_setup(&of->fmu, start_s));
+    return told(of, mpc_instance_setup(&of->fmu, start_s));
 }
 
 STATUS NAME(fmi2EnterInitializationMode)(fmi2Component c)
 {
     instance *const of = (instance *)c;
-    return told(of, mpc_fmu_enter(&of->fmu));
+    return told(of, mpc_instance_enter(&of->fmu));
 }
 
 STATUS NAME(fmi2ExitInitializationMode)(fmi2Component c)
 {
     instance *const of = (instance *)c;
-    return told(of, mpc_fmu_exit(&of->fmu));
+    return told(of, mpc_instance_exit(&of->fmu));
 }
 
 STATUS NAME(fmi2Terminate)(fmi2Component c)
 {
     instance *const of = (instance *)c;
-    return told(of, mpc_fmu_terminate(&of->fmu));
+    return told(of, mpc_instance_terminate(&of->fmu));
 }
 
 STATUS NAME(fmi2Reset)(fmi2Component c)
 {
-    mpc_fmu_reset(&((instance *)c)->fmu);
+    mpc_instance_reset(&((instance *)c)->fmu);
     return fmi2OK;
 }
 
@@ -132,10 +133,10 @@ STATUS NAME(fmi2Reset)(fmi2Component c)
                           TYPE value[])                                                            \
     {                                                                                              \
         instance *const of = (instance *)c;                                                        \
-        int32_t status = MPC_FMU_OK;                                                               \
-        for (size_t i = 0U; (i < count) && (status == MPC_FMU_OK); i++) {                          \
+        int32_t status = MPC_OK;                                                                   \
+        for (size_t i = 0U; (i < count) && (status == MPC_OK); i++) {                              \
             double found = 0.0;                                                                    \
-            status = mpc_fmu_get(&of->fmu, vr[i], (KIND), &found);                                 \
+            status = mpc_instance_get(&of->fmu, vr[i], (KIND), &found);                            \
             value[i] = (TYPE)found;                                                                \
         }                                                                                          \
         return told(of, status);                                                                   \
@@ -144,29 +145,29 @@ STATUS NAME(fmi2Reset)(fmi2Component c)
                           const TYPE value[])                                                      \
     {                                                                                              \
         instance *const of = (instance *)c;                                                        \
-        int32_t status = MPC_FMU_OK;                                                               \
-        for (size_t i = 0U; (i < count) && (status == MPC_FMU_OK); i++) {                          \
-            status = mpc_fmu_set(&of->fmu, vr[i], (KIND), (double)value[i]);                       \
+        int32_t status = MPC_OK;                                                                   \
+        for (size_t i = 0U; (i < count) && (status == MPC_OK); i++) {                              \
+            status = mpc_instance_set(&of->fmu, vr[i], (KIND), (double)value[i]);                  \
         }                                                                                          \
         return told(of, status);                                                                   \
     }
 
-GET_AND_SET(fmi2GetReal, fmi2SetReal, fmi2Real, MPC_FMU_REAL)
-GET_AND_SET(fmi2GetInteger, fmi2SetInteger, fmi2Integer, MPC_FMU_INTEGER)
-GET_AND_SET(fmi2GetBoolean, fmi2SetBoolean, fmi2Boolean, MPC_FMU_BOOLEAN)
+GET_AND_SET(fmi2GetReal, fmi2SetReal, fmi2Real, MPC_REAL)
+GET_AND_SET(fmi2GetInteger, fmi2SetInteger, fmi2Integer, MPC_INTEGER)
+GET_AND_SET(fmi2GetBoolean, fmi2SetBoolean, fmi2Boolean, MPC_BOOLEAN)
 
 STATUS NAME(fmi2DoStep)(fmi2Component c, fmi2Real from_s, fmi2Real step_s, fmi2Boolean no_return)
 {
     instance *const of = (instance *)c;
     (void)no_return;
-    return told(of, mpc_fmu_step(&of->fmu, from_s, step_s));
+    return told(of, mpc_instance_step(&of->fmu, from_s, step_s));
 }
 
 STATUS NAME(fmi2GetRealStatus)(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
 {
     fmi2Status status = fmi2OK;
     if (kind == fmi2LastSuccessfulTime) {
-        *value = mpc_fmu_time_s(&((instance *)c)->fmu);
+        *value = mpc_instance_time_s(&((instance *)c)->fmu);
     } else {
         status = mpc_fmi2_refuse(c, "fmi2GetRealStatus knows the last successful time only");
     }
@@ -178,7 +179,7 @@ STATUS NAME(fmi2GetBooleanStatus)(fmi2Component c, const fmi2StatusKind kind, fm
 {
     fmi2Status status = fmi2OK;
     if (kind == fmi2Terminated) {
-        *value = (fmi2Boolean)mpc_fmu_has_arrived(&((instance *)c)->fmu);
+        *value = (fmi2Boolean)mpc_instance_has_arrived(&((instance *)c)->fmu);
     } else {
         status = mpc_fmi2_refuse(c, "fmi2GetBooleanStatus knows fmi2Terminated only");
     }
@@ -187,7 +188,8 @@ STATUS NAME(fmi2GetBooleanStatus)(fmi2Component c, const fmi2StatusKind kind, fm
 
 STATUS NAME(fmi2GetFMUstate)(fmi2Component c, fmi2FMUstate *state)
 {
-    mpc_fmu_state *const kept = mpc_fmu_kept(&((instance *)c)->fmu, (mpc_fmu_state *)*state);
+    mpc_instance_state *const kept =
+        mpc_fmi_kept(&((instance *)c)->fmu, (mpc_instance_state *)*state);
     fmi2Status status = fmi2OK;
     if (kept != NULL) {
         *state = kept;
@@ -199,7 +201,7 @@ STATUS NAME(fmi2GetFMUstate)(fmi2Component c, fmi2FMUstate *state)
 
 STATUS NAME(fmi2SetFMUstate)(fmi2Component c, fmi2FMUstate state)
 {
-    ((instance *)c)->fmu.state = *(const mpc_fmu_state *)state;
+    ((instance *)c)->fmu.state = *(const mpc_instance_state *)state;
     return fmi2OK;
 }
 

@@ -3,10 +3,11 @@
 #include <string.h>
 
 #include "mpc_fmi3.h"
-#include "mpc_fmu.h"
+#include "mpc_fmi_instance.h"
+#include "mpc_fmi_token.h"
 
 typedef struct {
-    mpc_fmu fmu;
+    mpc_instance fmu;
     fmi3LogMessageCallback log;
     fmi3InstanceEnvironment environment;
 } instance;
@@ -14,8 +15,8 @@ typedef struct {
 /* Warnings and errors are logged whether debug logging is on or off: there is no other kind. */
 static fmi3Status told(instance *of, int32_t status)
 {
-    if ((status != MPC_FMU_OK) && (of->log != NULL)) {
-        of->log(of->environment, (fmi3Status)status, mpc_fmu_categories[status], of->fmu.message);
+    if ((status != MPC_OK) && (of->log != NULL)) {
+        of->log(of->environment, (fmi3Status)status, mpc_fmi_categories[status], of->fmu.message);
     }
     return (fmi3Status)status;
 }
@@ -23,7 +24,7 @@ static fmi3Status told(instance *of, int32_t status)
 fmi3Status mpc_fmi3_refuse(fmi3Instance c, const char *why)
 {
     instance *const of = (instance *)c;
-    return told(of, mpc_fmu_refuse(&of->fmu, why));
+    return told(of, mpc_instance_refuse(&of->fmu, why));
 }
 
 EXPORT const char *NAME(fmi3GetVersion)(void) { return "3.0"; }
@@ -42,7 +43,7 @@ static fmi3Instance not_made(fmi3InstanceEnvironment environment, fmi3LogMessage
                              const char *why)
 {
     if (log != NULL) {
-        log(environment, fmi3Error, mpc_fmu_categories[fmi3Error], why);
+        log(environment, fmi3Error, mpc_fmi_categories[fmi3Error], why);
     }
     return NULL;
 }
@@ -61,7 +62,7 @@ EXPORT fmi3Instance NAME(fmi3InstantiateCoSimulation)(
     (void)allows_early_return;
     (void)intermediate;
     (void)update;
-    if ((token == NULL) || (strcmp(token, MPC_FMU_TOKEN) != 0)) {
+    if ((token == NULL) || (strcmp(token, MPC_FMI_TOKEN) != 0)) {
         return not_made(environment, log, "the instantiation token is not that of this FMU");
     }
     if (uses_events || (intermediate_count > 0U)) {
@@ -73,7 +74,7 @@ EXPORT fmi3Instance NAME(fmi3InstantiateCoSimulation)(
     }
     made->log = log;
     made->environment = environment;
-    mpc_fmu_reset(&made->fmu);
+    mpc_instance_reset(&made->fmu);
     return made;
 }
 
@@ -88,9 +89,9 @@ STATUS NAME(fmi3EnterInitializationMode)(fmi3Instance c, fmi3Boolean has_toleran
     (void)tolerance;
     (void)has_stop;
     (void)stop_s;
-    int32_t status = mpc_fmu_setup(&of->fmu, start_s);
-    if (status == MPC_FMU_OK) {
-        status = mpc_fmu_enter(&of->fmu);
+    int32_t status = mpc_instance_setup(&of->fmu, start_s);
+    if (status == MPC_OK) {
+        status = mpc_instance_enter(&of->fmu);
     }
     return told(of, status);
 }
@@ -98,18 +99,18 @@ STATUS NAME(fmi3EnterInitializationMode)(fmi3Instance c, fmi3Boolean has_toleran
 STATUS NAME(fmi3ExitInitializationMode)(fmi3Instance c)
 {
     instance *const of = (instance *)c;
-    return told(of, mpc_fmu_exit(&of->fmu));
+    return told(of, mpc_instance_exit(&of->fmu));
 }
 
 STATUS NAME(fmi3Terminate)(fmi3Instance c)
 {
     instance *const of = (instance *)c;
-    return told(of, mpc_fmu_terminate(&of->fmu));
+    return told(of, mpc_instance_terminate(&of->fmu));
 }
 
 STATUS NAME(fmi3Reset)(fmi3Instance c)
 {
-    mpc_fmu_reset(&((instance *)c)->fmu);
+    mpc_instance_reset(&((instance *)c)->fmu);
     return fmi3OK;
 }
 
@@ -122,10 +123,10 @@ STATUS NAME(fmi3Reset)(fmi3Instance c)
         if (values != count) {                                                                     \
             return mpc_fmi3_refuse(c, "all variables are scalar: as many values as references");   \
         }                                                                                          \
-        int32_t status = MPC_FMU_OK;                                                               \
-        for (size_t i = 0U; (i < count) && (status == MPC_FMU_OK); i++) {                          \
+        int32_t status = MPC_OK;                                                                   \
+        for (size_t i = 0U; (i < count) && (status == MPC_OK); i++) {                              \
             double found = 0.0;                                                                    \
-            status = mpc_fmu_get(&of->fmu, vr[i], (KIND), &found);                                 \
+            status = mpc_instance_get(&of->fmu, vr[i], (KIND), &found);                            \
             value[i] = (TYPE)found;                                                                \
         }                                                                                          \
         return told(of, status);                                                                   \
@@ -137,16 +138,16 @@ STATUS NAME(fmi3Reset)(fmi3Instance c)
         if (values != count) {                                                                     \
             return mpc_fmi3_refuse(c, "all variables are scalar: as many values as references");   \
         }                                                                                          \
-        int32_t status = MPC_FMU_OK;                                                               \
-        for (size_t i = 0U; (i < count) && (status == MPC_FMU_OK); i++) {                          \
-            status = mpc_fmu_set(&of->fmu, vr[i], (KIND), (double)value[i]);                       \
+        int32_t status = MPC_OK;                                                                   \
+        for (size_t i = 0U; (i < count) && (status == MPC_OK); i++) {                              \
+            status = mpc_instance_set(&of->fmu, vr[i], (KIND), (double)value[i]);                  \
         }                                                                                          \
         return told(of, status);                                                                   \
     }
 
-GET_AND_SET(fmi3GetFloat64, fmi3SetFloat64, fmi3Float64, MPC_FMU_REAL)
-GET_AND_SET(fmi3GetInt32, fmi3SetInt32, fmi3Int32, MPC_FMU_INTEGER)
-GET_AND_SET(fmi3GetBoolean, fmi3SetBoolean, fmi3Boolean, MPC_FMU_BOOLEAN)
+GET_AND_SET(fmi3GetFloat64, fmi3SetFloat64, fmi3Float64, MPC_REAL)
+GET_AND_SET(fmi3GetInt32, fmi3SetInt32, fmi3Int32, MPC_INTEGER)
+GET_AND_SET(fmi3GetBoolean, fmi3SetBoolean, fmi3Boolean, MPC_BOOLEAN)
 
 /* At arrival the end of the simulation is asked for; a step beyond it is discarded. */
 STATUS NAME(fmi3DoStep)(fmi3Instance c, fmi3Float64 from_s, fmi3Float64 step_s,
@@ -155,17 +156,18 @@ STATUS NAME(fmi3DoStep)(fmi3Instance c, fmi3Float64 from_s, fmi3Float64 step_s,
 {
     instance *const of = (instance *)c;
     (void)no_return;
-    const int32_t status = mpc_fmu_step(&of->fmu, from_s, step_s);
+    const int32_t status = mpc_instance_step(&of->fmu, from_s, step_s);
     *has_events = false;
-    *terminate = (mpc_fmu_has_arrived(&of->fmu) != 0);
+    *terminate = (mpc_instance_has_arrived(&of->fmu) != 0);
     *is_early = false;
-    *last_s = mpc_fmu_time_s(&of->fmu);
+    *last_s = mpc_instance_time_s(&of->fmu);
     return told(of, status);
 }
 
 STATUS NAME(fmi3GetFMUState)(fmi3Instance c, fmi3FMUState *state)
 {
-    mpc_fmu_state *const kept = mpc_fmu_kept(&((instance *)c)->fmu, (mpc_fmu_state *)*state);
+    mpc_instance_state *const kept =
+        mpc_fmi_kept(&((instance *)c)->fmu, (mpc_instance_state *)*state);
     fmi3Status status = fmi3OK;
     if (kept != NULL) {
         *state = kept;
@@ -177,7 +179,7 @@ STATUS NAME(fmi3GetFMUState)(fmi3Instance c, fmi3FMUState *state)
 
 STATUS NAME(fmi3SetFMUState)(fmi3Instance c, fmi3FMUState state)
 {
-    ((instance *)c)->fmu.state = *(const mpc_fmu_state *)state;
+    ((instance *)c)->fmu.state = *(const mpc_instance_state *)state;
     return fmi3OK;
 }
 

@@ -1,4 +1,4 @@
-"""The variables of an FMU: what goes in and out each second, with units and limits."""
+"""The variables of a part: what goes in and out each second, with units and limits."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -16,15 +16,15 @@ LAST_RUNG = 2
 
 @dataclass(frozen=True)
 class Variable:
-    """One variable of an FMU; its value reference is its place in the list.
+    """One variable; its value reference is its place in the list.
 
     Attributes
     ----------
-    name : in Python, C and the FMU
+    name : in Python, C and the tool that simulates
     role : what FMI calls causality
     description : in one line
     kind : of its values
-    unit : one of `qpmpc.codegen.fmu.units.UNITS`; none for integers and booleans
+    unit : one of `qpmpc.codegen.parts.units.UNITS`; none for integers and booleans
     start : before the first second
     low, high : least and greatest value that has a meaning, if there are such
     display : unit in which a tool may show it

@@ -1,4 +1,4 @@
-"""Units of an FMU's variables, in terms of the SI."""
+"""Units of the variables of parts, in terms of the SI."""
 
 from dataclasses import dataclass, field
 

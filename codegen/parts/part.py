@@ -1,4 +1,4 @@
-"""The two parts that can be an FMU: its variables, and its C sources before they get a prefix."""
+"""The two parts that simulation tools run: variables, and C sources before they get a prefix."""
 
 from dataclasses import dataclass
 
@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.codegen.examples import is_example
-from qpmpc.codegen.fmu.variables import Variable, controller_variables, plant_variables
 from qpmpc.codegen.generate import Precision, literals, project_files, template_text, texts_of
 from qpmpc.codegen.method import Generated, Method
+from qpmpc.codegen.parts.variables import Variable, controller_variables, plant_variables
 from qpmpc.codegen.rows.c_text import Writer
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.errors import InputError
@@ -22,9 +22,10 @@ from qpmpc.vehicle.engine import optimal_line
 from qpmpc.vehicle.parameters import Vehicle
 from qpmpc.vehicle.plant import BOILING_DEGC, POWER_TOLERANCE_W
 
-OF_CONTROLLER = ("mpc_fmu_controller.h", "mpc_fmu_controller.c")
-OF_PLANT = ("mpc_fmu_plant.h", "mpc_fmu_plant.c", "mpc_plant.h", "mpc_plant.c")
-PART = "mpc_fmu_part.h"  # what mpc_fmu.h calls the header of the part
+OF_CONTROLLER = ("mpc_part_controller.h", "mpc_part_controller.c")
+OF_PLANT = ("mpc_part_plant.h", "mpc_part_plant.c", "mpc_plant.h", "mpc_plant.c")
+OF_INSTANCE = ("mpc_instance.h", "mpc_instance.c")  # of either
+PART = "mpc_part.h"  # what mpc_instance.h calls the header of the part
 
 
 @dataclass(frozen=True)
@@ -33,20 +34,27 @@ class Part:
 
     Attributes
     ----------
-    description : in one line
+    what : it is, in words that may stand in a comment of C
+    of_trip : goes on with the name of its trip, a user's text; empty if it knows none
     variables : by value reference
-    sources : C files by name
+    sources : all C files by name but those of the tool that simulates
     notice : licence
     trip_s : seconds of the trip that it knows; None if it knows none
-    prepared : whether it plans before the trip; None if it does not plan
+    precision : of its arithmetic
     """
 
-    description: str
+    what: str
+    of_trip: str
     variables: list[Variable]
     sources: dict[str, str]
     notice: str
     trip_s: int | None
-    prepared: bool | None = None
+    precision: Precision = "f64"
+
+    @property
+    def description(self) -> str:
+        """What it is and which trip it knows, in one line."""
+        return f"{self.what}{self.of_trip}"
 
 
 def controller_part(
@@ -73,16 +81,17 @@ def controller_part(
     files = project_files(values, "host", precision)
     sources = {n: t for n, t in files.items() if n.endswith((".c", ".h")) and not is_example(n)}
     sources |= _programs(OF_CONTROLLER)
-    sources["mpc_fmu_trip.h"] = _road(trip.forecast, "mpc_real", precision)
+    sources["mpc_trip.h"] = _road(trip.forecast, "mpc_real", precision)
     certificate = values.costate is not None
+    variables = controller_variables(trip.vehicle, values.learning, certificate)
     return Part(
-        f"Controller {controller} of {values.vehicle}, {precision}, which knows the trip "
-        f"{shown(trip.cycle.name)}",
-        controller_variables(trip.vehicle, values.learning, certificate),
-        sources,
+        f"Controller {controller} of {values.vehicle}, {precision}",
+        f", which knows the trip {shown(trip.cycle.name)}",
+        variables,
+        sources | _of_variables(variables, trip.steps, method.prepared),
         files["NOTICE"],
         trip.steps,
-        method.prepared,
+        precision,
     )
 
 
@@ -90,18 +99,21 @@ def plant_part(vehicle: Vehicle, trip: Trip | None = None) -> Part:
     """Return the plant of a vehicle; with a trip it drives that, whose vehicle must be the same."""
     sources = _programs(OF_PLANT)
     sources["mpc_plant_data.h"] = _numbers(vehicle)
-    sources["mpc_fmu_trip.h"] = (
+    sources["mpc_trip.h"] = (
         "/* There is no trip: demand and speed are inputs. */\n"
         if trip is None
         else _road(trip.truth, "double", "f64")
     )
     driving = "" if trip is None else f", which drives the trip {shown(trip.cycle.name)}"
+    variables = plant_variables(vehicle, trip is not None)
+    trip_s = None if trip is None else trip.steps
     return Part(
-        f"Plant of {vehicle.name}{driving}",
-        plant_variables(vehicle, trip is not None),
-        sources,
+        f"Plant of {vehicle.name}",
+        driving,
+        variables,
+        sources | _of_variables(variables, trip_s),
         template_text("NOTICE_plant.j2"),
-        None if trip is None else trip.steps,
+        trip_s,
     )
 
 
@@ -128,9 +140,18 @@ def _check_road(trip: Trip) -> None:
 
 
 def _programs(names: tuple[str, ...]) -> dict[str, str]:
-    texts = texts_of("fmu/programs")
+    texts = texts_of("parts/programs")
     header, *others = names
-    return {PART: texts[header]} | {name: texts[name] for name in others}
+    return {PART: texts[header]} | {name: texts[name] for name in (*others, *OF_INSTANCE)}
+
+
+def _of_variables(
+    variables: list[Variable], trip_s: int | None, prepared: bool | None = None
+) -> dict[str, str]:
+    """Return the files of the variables; `prepared`: whether a controller plans before the trip."""
+    context = {"trip_s": trip_s or 0, "prepared": prepared, "variables": variables}
+    names = ("mpc_variables.h", "mpc_variables.c")
+    return {name: template_text(f"{name}.j2", **context) for name in names}
 
 
 def _road(trace: Trace, kind: str, precision: Precision) -> str:
@@ -138,7 +159,7 @@ def _road(trace: Trace, kind: str, precision: Precision) -> str:
         "demand_w": literals(trace.demand_w, precision),
         "speed_mps": literals(trace.speed_mps, precision),
     }
-    return template_text("mpc_fmu_trip.h.j2", type=kind, arrays=arrays)
+    return template_text("mpc_trip.h.j2", type=kind, arrays=arrays)
 
 
 def _numbers(vehicle: Vehicle) -> str:
