@@ -7,6 +7,7 @@ from qpmpc.report.columns import NONE, number
 from qpmpc.report.html import preformatted
 from qpmpc.report.study.answer import runs_text, study_answer
 from qpmpc.report.study.distribution_chart import distribution_chart
+from qpmpc.report.study.factor_chart import factor_charts
 from qpmpc.report.study.figures import (
     ABOVE_DP,
     MEASURES,
@@ -96,7 +97,7 @@ def study_page(
             pictures=chosen(pictures, "distr"),
             charts=_charts(table, summary, pictures),
         ),
-        _factors(summary, pictures, measure),
+        _factors(table, summary, pictures, measure),
         _all_figures(summary),
         _worst(frame, table, study, measure, pictures, remarks),
         _failed(frame, table),
@@ -145,7 +146,10 @@ def _charts(
 
 
 def _factors(
-    summary: Mapping[str, Any], pictures: Mapping[str, bytes], measure: Measure
+    table: "DataFrame",
+    summary: Mapping[str, Any],
+    pictures: Mapping[str, bytes],
+    measure: Measure,
 ) -> Section:
     title = f"What the {measure.title} depends on"
     factors = summary["factors"]
@@ -175,6 +179,13 @@ def _factors(
         [Table(header, rows)],
         summary["factor_remarks"],
         pictures=chosen(pictures, "factor"),
+        charts={
+            name.replace("_", " "): factor_charts(
+                table, names, measure, name.removeprefix("factor_")
+            )
+            for name in pictures
+            if name.startswith("factor_")
+        },
     )
 
 
