@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from browser import assert_works
 from hostile import AS_SHOWN, TEXT, is_harmless
 from pages import Page, assert_self_contained
 from pandas import DataFrame
@@ -200,6 +201,10 @@ def test_files(written, summary):
     pictures = {file.name for file in folder.glob("*.png")}
     assert len(pictures) == 7
     assert "factor_set.thermal.t_amb_degc.png" in pictures
+
+
+def test_in_a_browser(written):
+    assert_works(written[0] / "report.html", charts=6, tables=17)
 
 
 EDGES = {

@@ -71,4 +71,4 @@ def chosen(pictures: Mapping[str, bytes], start: str) -> list[tuple[str, str]]:
 
 def table_of(data: Mapping[str, str]) -> Table:
     """Return names and values as a table."""
-    return Table(("", ""), [(name, text) for name, text in data.items()], names=2)
+    return Table(("what", "value"), [(name, text) for name, text in data.items()], names=2)

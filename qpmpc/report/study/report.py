@@ -160,7 +160,10 @@ def _factors(
     names = summary["grouped_by"]
     groups = factors[0]["groups"][:MOST_COLUMNS]
     fewest = min((each["n"] for each in groups if each["n"] > 1), default=2)
-    header = ["", *(f"{', '.join(value_text(g[n]) for n in names)} ({g['n']:,})" for g in groups)]
+    header = [
+        "factor",
+        *(f"{', '.join(value_text(g[n]) for n in names)} ({g['n']:,})" for g in groups),
+    ]
     rows = [
         [column_text(factor["column"]) + ("" if factor["numeric"] else " (categories)")]
         + [number(each["correlation"], 2) for each in factor["groups"][:MOST_COLUMNS]]

@@ -46,9 +46,10 @@ const make = (tag, text, className) => {
     table.classList.add("sorted");
   };
 
-  // as qpmpc/report/csv_text.py: a spreadsheet computes what begins so, unless it is figures alone
+  // as qpmpc/report/csv_text.py: a spreadsheet computes what begins so, but for a figure, which may
+  // be followed by its unit, a range or words; they hold nothing that computes
   const formula = /^\s*[=+\-@\uFF1D\uFF0B\uFF0D\uFF20]/;
-  const figures = /^[+-]?[\d,]*\.?\d+(e[+-]?\d+)?(( ?(\.\.|to|\/|\[|,) ?)[+-]?[\d,]*\.?\d+)*[\]*% ]*$|^-$/i;
+  const figures = /^[+-]?[\d.][\d,]*(?:[\w\s.,%[\]\u00B0]|-(?=[\d.]))*\*?$|^-$/;
   const inert = (cell) => (formula.test(cell) && !figures.test(cell) ? `'${cell}` : cell);
   const quoted = (cell) => /[",;\t\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell;
   const download = (table) => {
