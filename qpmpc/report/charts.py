@@ -29,7 +29,7 @@ class Series:
     values : one for each value of the axis; those that are not finite leave a gap
     group : what it is left out with; empty: never
     stepped : each value holds until the next
-    aside : shown in its panel, but alone no reason to show the panel
+    aside : a limit, say: shown where the scale of the others reaches, alone no reason for a panel
     points : without a line
     size : of its points, pixels; with one a line has points, and points may lie over each other
     joined : the line leaves no gap
@@ -162,7 +162,8 @@ def run_chart(
         ]
         count = len(first.trajectory.soc)
         named = zip(("least allowed", "most allowed"), limits, strict=True)
-        panels.append(Panel(label, lines + [_limit(n, value, count) for n, value in named]))
+        allowed = f"{label} (allowed: {limits[0]:g} to {limits[1]:g})"
+        panels.append(Panel(allowed, lines + [_limit(n, value, count) for n, value in named]))
     fuel = [
         Series(style["group"], numbers([0.0, *np.cumsum(run.trajectory.fuel_g)]), **style)
         for run, style in zip(runs, styles, strict=True)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.report.charts import Panel, Series, groups_of, in_rows, lines, numbers, only
-from qpmpc.report.style import BLACK, GREY, VERMILION
+from qpmpc.report.style import BLACK, GREY, PURPLE, VERMILION
 from qpmpc.verification.reproduction import paper
 from qpmpc.verification.reproduction.drawing import color
 from qpmpc.verification.reproduction.study import Study
@@ -15,6 +15,12 @@ from qpmpc.verification.reproduction.tables import printed_name
 from qpmpc.verification.reproduction.variants import RULES
 
 SPREAD = 0.25  # of the dots of a row, in rows
+TRIP, BROKEN, MEAN = "a trip", "a trip that violates a limit", "mean of its kind"
+KINDS: tuple[tuple[str, str, dict[str, Any]], ...] = (
+    (TRIP, VERMILION, {"points": True, "size": 6}),
+    (BROKEN, PURPLE, {"points": True, "hollow": True}),
+    (MEAN, BLACK, {"points": True, "hollow": True, "size": 11}),
+)
 
 
 def bars_chart(study: Study, labels: Sequence[str]) -> dict[str, Any]:
@@ -101,29 +107,36 @@ def losses_chart(study: Study) -> dict[str, Any]:
         for i in range(len(models)):
             own = places == i
             places[own] += np.linspace(-SPREAD, SPREAD, own.sum()) if own.sum() > 1 else 0.0
-        order = np.argsort(places, kind="stable").tolist()
-        loss = [runs[i].loss_percent for i in order]
-        labels = [
-            f"{runs[i].model}, seed {runs[i].seed}: {runs[i].loss_percent:+.2f} %"
-            + (", a limit violated" if runs[i].violates else "")
-            for i in order
+        marks = [
+            (
+                place,
+                run.loss_percent,
+                BROKEN if run.violates else TRIP,
+                f"{run.model}, seed {run.seed}: {run.loss_percent:+.2f} %"
+                + (", a limit violated" if run.violates else ""),
+            )
+            for place, run in zip(places.tolist(), runs, strict=True)
         ]
-        kept = [not runs[i].violates for i in order]
+        for i, model in enumerate(models):
+            mean = float(np.mean([run.loss_percent for run in runs if run.model == model]))
+            marks.append((float(i), mean, MEAN, f"{model}: {mean:+.2f} % in the mean"))
+        marks.sort(key=lambda mark: mark[0])
+        loss = [value for _, value, _, _ in marks]
         dots = [
-            Series("trip", only(loss, kept), VERMILION, points=True),
-            Series(
-                "trip, a limit violated",
-                only(loss, [not each for each in kept]),
-                BLACK,
-                points=True,
-                hollow=True,
-            ),
+            Series(name, only(loss, [kind == name for _, _, kind, _ in marks]), color, name, **look)
+            for name, color, look in KINDS
         ]
-        label = (
-            f"{cycle}: loss of fuel, % ({sum(not k for k in kept)} of {len(runs)} violate a limit)"
+        bad = sum(run.violates for run in runs)
+        panels.append(
+            Panel(
+                f"{cycle}: loss of fuel, % ({bad} of {len(runs)} violate a limit)",
+                dots,
+                zero=True,
+                x=numbers([place for place, _, _, _ in marks]),
+                labels=[said for _, _, _, said in marks],
+            )
         )
-        panels.append(Panel(label, dots, zero=True, x=numbers(places[order]), labels=labels))
-    return in_rows(models, panels)
+    return in_rows(models, panels, groups_of(panels))
 
 
 def distances_chart(study: Study, labels: Sequence[str], marked: str) -> dict[str, Any]:

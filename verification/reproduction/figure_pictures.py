@@ -85,8 +85,8 @@ def fuel_picture(study: Study) -> Picture:
         LABELS,
         "fuel",
         "Fuel of all controllers",
-        "SOC-balanced fuel; above each bar the saving over the rules, and below it the paper's "
-        "where it prints one.",
+        "SOC-balanced fuel, its difference from the rules, and the paper's where it prints one: "
+        "in the page under the cursor, in the files in brackets.",
     )
 
 
@@ -205,7 +205,7 @@ def robustness_picture(study: Study) -> Picture:
     return Picture(
         "robustness",
         "Wrong forecasts",
-        "A dot is a trip, a bar the mean of its kind. Below zero the wrong forecast happened to "
+        "A dot is a trip, a bar or ring the mean of its kind. Below zero the forecast happened to "
         "save fuel, because the plan's model is not the plant.",
         figure,
         {

@@ -1,8 +1,8 @@
 "use strict";
 // One panel of a chart as uPlot draws it: lines, points or bars; over time, any axis or rows.
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-// black lines are drawn in the colour of text: on dark paper too they are seen
-const colour = (value) => (value === "#000000" ? css("--ink") : value);
+// black lines are drawn in the colour of text, limits in that of failures: seen on dark paper too
+const colour = (value) => (value === "#000000" ? css("--ink") : value === "#AA0000" ? css("--bad") : value);
 const faded = (value, opacity) => {
   const whole = colour(value); // #222 is #222222
   return (whole.length === 4 ? `#${[...whole.slice(1)].map((digit) => digit + digit).join("")}` : whole) + opacity;
@@ -40,9 +40,10 @@ const series = (each) => {
     dash: each.dash || [],
     width: each.points ? 0 : each.width || 1.5,
     paths: each.points ? () => null : each.bars ? uPlot.paths.bars({ size: [0.7, ROW] }) : each.stepped ? uPlot.paths.stepped({ align: 1 }) : undefined,
-    points: dots ? { show: true, size: each.size || 8, width: 1.5, stroke: () => colour(each.color), fill: () => (each.hollow ? css("--paper") : faded(each.color, each.size ? "99" : "ff")) } : { show: false },
+    points: dots ? { show: true, size: each.size || 8, width: 1.5, stroke: () => colour(each.color), fill: () => (each.hollow ? "transparent" : faded(each.color, each.size ? "99" : "ff")) } : { show: false },
     value: (_, value) => plain(value, 4),
     spanGaps: Boolean(each.joined),
+    auto: !each.aside, // a limit far away would flatten the lines
   };
 };
 
@@ -69,8 +70,11 @@ const name = (plot, texts) => {
   ctx.lineWidth = 3 * unit;
   for (const [x, y, i] of points) {
     if (!texts[i] || done.has(i)) continue;
-    const width = ctx.measureText(texts[i]).width, half = 7 * unit, away = 8 * unit;
-    for (const [dx, dy] of [[away, 0], [-away - width, 0], [away, -2 * half], [away, 2 * half], [-away - width, -2 * half], [-away - width, 2 * half]]) {
+    const width = ctx.measureText(texts[i]).width, half = 7 * unit, away = 8 * unit, slant = 1.7 * half;
+    const left = -away - width;
+    const sides = [[away, 0], [left, 0]]; // of a bar; beside a point a line may go on
+    const slants = [[away, -slant], [left, slant], [left, -slant], [away, slant]];
+    for (const [dx, dy] of plot.scales.x.ori ? [...sides, ...slants] : [...slants, ...sides]) {
       const box = [x + dx, y + dy - half, x + dx + width, y + dy + half];
       const inside = box[0] >= bbox.left && box[1] >= bbox.top && box[2] <= bbox.left + bbox.width && box[3] <= bbox.top + bbox.height;
       if (!inside || taken.some((other) => box[0] < other[2] && other[0] < box[2] && box[1] < other[3] && other[1] < box[3])) continue;
