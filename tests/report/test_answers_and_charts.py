@@ -18,7 +18,7 @@ from qpmpc.verification.benchmark.charts import histogram_chart, pareto_charts
 from qpmpc.verification.benchmark.pareto import Point
 from qpmpc.verification.benchmark.report import benchmark_answer
 from qpmpc.verification.checks import Check
-from qpmpc.verification.checks.report import Results, verification_answer
+from qpmpc.verification.checks.report import Results, nearest_checks, verification_answer
 
 NO_EXCESS = {"soc": 0.0, "t_cl_degc": 0.0, "power_w": 0.0}
 HOLDS = Check("Bounds", "It is below.", 1.0, 0.5)
@@ -40,6 +40,17 @@ def test_verification(checks, first):
     assert said[0] == first
     assert ("Not tested on this machine: Emulator." in said) == (SKIPPED in checks)
     assert "Quick run: fewer cycles and samples." in said
+
+
+def test_what_failed_comes_first_then_what_uses_most_of_its_tolerance():
+    loose = Check("Loose", "It is far below.", 1.0, 0.1)
+    most = Check("Share", "It is above.", 80.0, 100.0, at_least=True)  # 80 % used
+    unknown = Check("Broken", "It is a number.", 1.0, float("nan"))
+    exact = Check("Exact", "It is none.", 0.0, 0.0)
+    groups = [("A", [loose, HOLDS, unknown]), ("B", [most, SKIPPED, FAILS, exact])]
+    found = nearest_checks(Results(True, groups, [1.0]))
+    assert found == [("A", unknown), ("B", FAILS), ("B", most), ("A", HOLDS), ("A", loose)]
+    assert [check.share for _, check in found[1:]] == [2.0, 0.8, 0.5, 0.1]
 
 
 POINTS = [
