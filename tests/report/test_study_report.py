@@ -204,7 +204,7 @@ def test_files(written, summary):
 
 
 def test_in_a_browser(written):
-    assert_works(written[0] / "report.html", charts=6, tables=17)
+    assert_works(written[0] / "report.html", charts=7, tables=17)
 
 
 EDGES = {
@@ -241,8 +241,8 @@ def test_nothing_is_too_strange_to_report(name):
     assert is_harmless(json_text(summary))  # strict JSON: no NaN
     assert is_harmless(summary_markdown(summary))
     # one of the pictures of factors stands for all: they take most of the time
-    pictures, remarks = study_pictures(frame, summary | {"factors": summary["factors"][:1]})
-    assert Page(study_page(frame, study, summary, pictures, remarks)).text
+    drawn = study_pictures(frame, summary | {"factors": summary["factors"][:1]})
+    assert Page(study_page(frame, study, summary, drawn)).text
 
 
 def test_hostile_names_are_inert(tmp_path):

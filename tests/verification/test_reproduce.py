@@ -120,7 +120,7 @@ def test_the_page_needs_nothing_else_and_says_that_it_was_quick(folder: Path) ->
     assert "Quick run" in source
     assert source.count("data:image/png") == len(list(folder.glob("*.png")))
     assert "baseline H=100" in {group["name"] for group in page.charts[1]["groups"]}
-    assert_works(folder / PAGE, charts=12, tables=7)  # one picture is still: horizons of one step
+    assert_works(folder / PAGE, charts=13, tables=7)
 
 
 def test_data_hold_checks_and_sentences_with_the_numbers_of_the_runs(

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from qpmpc.report.charts import Panel, Series, groups_of, held, numbers, over_time
+from qpmpc.report.charts import Panel, Series, groups_of, held, lines, numbers, over_time
 from qpmpc.report.style import BLACK, BLUE, GREY, ORANGE, PURPLE
 from qpmpc.verification.reproduction.drawing import (
     chart,
@@ -157,6 +157,41 @@ def _thermal_chart(study: Study, cycle: str) -> dict[str, Any]:
     return over_time(panels, groups_of(panels))
 
 
+def _concept_chart(study: Study) -> dict[str, Any]:
+    panels = []
+    seconds = 0
+    for shot in study.snapshots:
+        stages, x = shot.plan.stages, shot.plan.x
+        used = stages.duration_s > 0.0
+        ends = shot.step + np.cumsum(stages.duration_s[used])
+        road = shot.truth.battery_side_w(study.vehicle) / 1e3
+        seconds = max(seconds, len(road))
+        at = np.unique([*range(len(road)), *ends[ends < len(road)]])
+        # the stage that a time is in; before the first there is none
+        stage = np.searchsorted(ends, at, side="right").clip(max=len(ends) - 1)
+        planned = np.where(at >= shot.step, stages.net_w[used][stage] / 1e3, np.nan)
+        tint = look(shot.label)["color"]
+        panels += [
+            Panel(
+                f"{shot.label}, {int(used.sum())} stages at {shot.step} s: net power, kW",
+                [
+                    Series("the road", numbers(road[at.astype(int)]), GREY, stepped=True),
+                    Series("stages of the horizon", numbers(planned), tint, stepped=True),
+                ],
+                x=numbers(at),
+            ),
+            *(
+                Panel(
+                    f"{shot.label}: planned {what}",
+                    [Series("plan", numbers(x[used, i]), tone, joined=True, size=5)],
+                    x=numbers(ends),
+                )
+                for i, what, tone in ((0, "SOC", BLUE), (1, "coolant, °C", ORANGE))
+            ),
+        ]
+    return lines(np.arange(seconds + 1), "time, s", "s", panels, [])
+
+
 def concept_picture(study: Study) -> Picture:
     """Short and long horizon of one step, from real data: the paper's grid and ours."""
     count = len(study.snapshots)
@@ -213,4 +248,5 @@ def concept_picture(study: Study) -> Picture:
         "its own duration: their places in the block are not known and do not matter.",
         finish(figure, axes, f"{name}: horizon of the QP at one step"),
         data,  # type: ignore[arg-type]
+        _concept_chart(study),
     )

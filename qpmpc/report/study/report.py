@@ -24,6 +24,7 @@ from qpmpc.report.study.pictures import column_text, draw_distribution, draw_fac
 from qpmpc.report.study.worst import (
     DRAWN,
     MOST_FAILED,
+    Drawn,
     Rerun,
     commands,
     draw_worst,
@@ -41,7 +42,7 @@ MOST_COLUMNS = 8  # of groups, in the table of factors
 
 def study_pictures(
     frame: "DataFrame", summary: Mapping[str, Any], rerun: Rerun | None = None
-) -> tuple[dict[str, bytes], list[str]]:
+) -> Drawn:
     """Draw the pictures of a study.
 
     Parameters
@@ -49,33 +50,26 @@ def study_pictures(
     frame : one row per run
     summary : as `study_summary` returns it
     rerun : drives the run of a row again, for the trajectories of the worst; None: without them
-
-    Returns
-    -------
-    pictures (PNG) by name, and a line for each that could not be made
     """
     table, columns = study_table(frame), summary["grouped_by"]
     measure, _ = main_measure(table)
-    drawn = {
+    made = {
         f"distribution_{each.key}": draw_distribution(table, columns, each)
         for each in dict.fromkeys((measure, ABOVE_DP, SAVING))
     }
     for factor in summary["factors"]:
         column = factor["column"]
-        drawn[f"factor_{column}"] = draw_factor(table, columns, measure, column)
-    worst: dict[str, bytes] = {}
-    remarks: list[str] = []
-    if rerun is not None:
-        worst, remarks = draw_worst(frame, table, measure, rerun)
-    return {name: data for name, data in drawn.items() if data is not None} | worst, remarks
+        made[f"factor_{column}"] = draw_factor(table, columns, measure, column)
+    drawn = Drawn() if rerun is None else draw_worst(frame, table, measure, rerun)
+    drawn.pictures = {k: data for k, data in made.items() if data is not None} | drawn.pictures
+    return drawn
 
 
 def study_page(
     frame: "DataFrame",
     study: Study,
     summary: Mapping[str, Any],
-    pictures: Mapping[str, bytes],
-    remarks: list[str],
+    drawn: Drawn,
 ) -> str:
     """Return the report of a study.
 
@@ -83,8 +77,9 @@ def study_page(
     ----------
     frame : one row per run
     summary : as `study_summary` returns it
-    pictures, remarks : as `study_pictures` returns them
+    drawn : as `study_pictures` returns it
     """
+    pictures = drawn.pictures
     table = study_table(frame)
     measure, _ = main_measure(table)
     varied = ", ".join(column.removeprefix("set.") for column in study.varied)
@@ -99,7 +94,7 @@ def study_page(
         ),
         _factors(table, summary, pictures, measure),
         _all_figures(summary),
-        _worst(frame, table, study, measure, pictures, remarks),
+        _worst(frame, table, study, measure, drawn),
         _failed(frame, table),
         Section(
             "What was run",
@@ -224,22 +219,22 @@ def _worst(
     table: "DataFrame",
     study: Study,
     measure: Measure,
-    pictures: Mapping[str, bytes],
-    remarks: list[str],
+    drawn: Drawn,
 ) -> Section:
     worst = worst_runs(table, measure)
     title = f"The worst runs by {measure.title}"
     if len(worst) == 0:
         return Section(title, [f"No run has a {measure.title}."])
-    drawn = chosen(pictures, "worst")
+    shown_runs = chosen(drawn.pictures, "worst")
     text = f"Of {', '.join(dict.fromkeys(worst['controller']))}; the references are left out."
     return Section(
         title,
-        [text, *([f"Drawn below: up to {DRAWN} of them, the worst first."] if drawn else [])],
+        [text, *([f"Drawn below: up to {DRAWN} of them, the worst first."] if shown_runs else [])],
         [runs_table(worst, study.varied)],
-        remarks,
-        drawn,
+        drawn.remarks,
+        shown_runs,
         commands(frame, worst),
+        charts={name.replace("_", " "): chart for name, chart in drawn.charts.items()},
     )
 
 

@@ -141,8 +141,9 @@ const rowAxis = (chart, width) => {
 const optionsOf = (chart, panel, x, whole, number, width, zoomed) => {
   const rows = Boolean(chart.rows), dots = panel.labels.length > 0;
   const ends = [x[0], x[x.length - 1]];
-  const room = chart.x_log ? [whole[0] / 1.25, whole[1] * 1.25] : [whole[0] - 0.04 * (whole[1] - whole[0]), whole[1] + 0.04 * (whole[1] - whole[0])];
-  const xRange = rows ? () => [-0.6, chart.rows.length - 0.4] : dots || chart.x_log ? (_, low, high) => (low === ends[0] && high === ends[1] ? room : [low, high]) : undefined;
+  const edge = dots ? 0.04 * (whole[1] - whole[0]) : 0; // no dot is cut
+  const room = chart.x_log ? [whole[0] / 1.25, whole[1] * 1.25] : [whole[0] - edge, whole[1] + edge];
+  const xRange = rows ? () => [-0.6, chart.rows.length - 0.4] : (_, low, high) => (low === ends[0] && high === ends[1] ? room : [low, high]);
   const above = rows && panel.texts.length ? 1.1 + (1.2 * widest(panel.texts)) / width : 1.08; // room for texts
   const yRange = panel.span.length ? panel.span : panel.zero ? (_, low, high) => [Math.min(low, 0), high > 0 ? above * high : 1] : panel.log ? (_, low, high) => [low / 1.3, high * 1.3] : undefined;
   const at = panel.labels.length ? (i) => panel.labels[i] : (i) => `${chart.x_name || ""} ${plain(x[i], 5)}`.trim();
