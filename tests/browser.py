@@ -62,6 +62,8 @@ def assert_works(file: Path, charts: int, tables: int, browser: Any = None) -> N
             assert page.evaluate(FOLDED) == 0
             _assert_tables(page)
             _assert_charts(page)
+            for rows in (False, True):
+                _assert_zoom(page, rows)
             dark = page.evaluate(PAPER)
             assert dark != WHITE
             page.locator("button.theme").click()
@@ -116,6 +118,41 @@ def _assert_tables(page: Any) -> None:
         assert [list(map(_one_line, row)) for row in lines] == [
             list(map(_one_line, row)) for row in shown
         ]
+
+
+def _assert_zoom(page: Any, rows: bool) -> None:
+    """Dragging to the right zooms the first chart of the kind, a double click shows all again."""
+    over = page.evaluate_handle(
+        """rows => [...document.querySelectorAll("figure.chart")].flatMap(f => f.charts)
+          .map(chart => chart.panels[0].plot)
+          .find(plot => (plot.scales.x.ori === 1) === rows)?.over || null""",
+        rows,
+    ).as_element()
+    if over is None:
+        return
+
+    def ends() -> list[float]:
+        found: list[float] = over.evaluate(
+            """(over, rows) => {
+              const of = [...document.querySelectorAll("figure.chart")].flatMap(f => f.charts)
+                .flatMap(chart => chart.panels).find(({plot}) => plot.over === over).plot.scales;
+              return rows ? [of.y.min, of.y.max] : [of.x.min, of.x.max];
+            }""",
+            rows,
+        )
+        return found
+
+    before = ends()
+    over.scroll_into_view_if_needed()
+    box = over.bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 4, box["y"] + 20)
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 20, steps=3)
+    page.mouse.up()
+    low, high = ends()
+    assert before[0] < low < high < before[1]
+    over.dblclick()
+    assert ends() == before
 
 
 def _one_line(cell: str) -> str:
