@@ -14,6 +14,7 @@ CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 FLAGS = ("--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking")
 PAPER = "getComputedStyle(document.body).backgroundColor"
 NOTHING = "\N{EN DASH}"
+A4 = 718  # pixels between margins of 1 cm
 WHITE = "rgb(255, 255, 255)"
 
 
@@ -72,7 +73,9 @@ def assert_works(file: Path, charts: int, tables: int, browser: Any = None) -> N
             page.evaluate(NARROWED)  # charts follow the window in one of the next frames
             assert max(page.evaluate(WIDTHS), default=0) <= 400
             assert page.evaluate("document.documentElement.scrollWidth") <= 400
+            page.set_viewport_size({"width": A4, "height": 1000})
             page.emulate_media(media="print")
+            assert page.evaluate("document.documentElement.scrollWidth") <= A4
             assert page.evaluate(PAPER) == WHITE
             pictures = page.locator("figure.chart > img")
             assert all(picture.is_visible() for picture in pictures.all())
