@@ -7,7 +7,7 @@ from qpmpc.cycles.catalogue import catalogue
 from qpmpc.cycles.cycle import Cycle
 from qpmpc.cycles.read_drive import read_drive
 from qpmpc.cycles.shipped import shipped_cycle
-from qpmpc.cycles.trips import ALLOWED, is_trip, looks_like_trip, make_trip
+from qpmpc.cycles.trips import ALLOWED, is_trip, looks_like_trip, make_trip, near_trips
 from qpmpc.errors import InputError
 from qpmpc.names import Names, Shipped
 
@@ -50,5 +50,5 @@ def load_cycle(name_or_path: str | os.PathLike[str]) -> Cycle:
     if path.suffix == "" and path.name == name and not os.path.exists(name):  # noqa: PTH110
         if looks_like_trip(name):
             make_trip(name)  # says what is wrong with it
-        raise InputError(CYCLES.unknown(name))
+        raise InputError(CYCLES.unknown(name, near_trips(name)))
     return read_drive(path)

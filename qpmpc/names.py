@@ -122,9 +122,9 @@ class Names:
                 f"{type(error).__name__}: {reason}"
             ) from error
 
-    def unknown(self, name: str) -> str:
-        """Return the error message for an unknown name."""
-        return unknown(self.kind, name, self.names(), self._also)
+    def unknown(self, name: str, near: Iterable[str] = ()) -> str:
+        """Return the error message for an unknown name; `near` as of `unknown`."""
+        return unknown(self.kind, name, self.names(), self._also, near)
 
     def settings_model(self, name: str) -> Any:
         """Return the pydantic model of a name's settings, None if there is none."""
@@ -139,7 +139,9 @@ def _load(target: str) -> Any:
     return getattr(import_module(module), attribute)
 
 
-def unknown(kind: str, name: str, allowed: Iterable[str], also: str = "") -> str:
+def unknown(
+    kind: str, name: str, allowed: Iterable[str], also: str = "", near: Iterable[str] = ()
+) -> str:
     """Return the message for an unknown name: the nearest known one and all others.
 
     Parameters
@@ -148,10 +150,11 @@ def unknown(kind: str, name: str, allowed: Iterable[str], also: str = "") -> str
     name : as the user gave it
     allowed : all known names
     also : other allowed inputs, at the end of the message
+    near : of these, names that may have been meant
     """
     names = tuple(allowed)
     use = f"use one of {', '.join(names)}{also}"
-    return f"unknown {kind} {shown_value(name)}{hint(name, names)} {use}"
+    return f"unknown {kind} {shown_value(name)}{hint(name, (*names, *near))} {use}"
 
 
 def hint(name: str, allowed: Iterable[str]) -> str:

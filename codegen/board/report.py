@@ -9,6 +9,7 @@ from qpmpc.codegen.board.check import SHOWN_SECONDS, BoardResult
 from qpmpc.codegen.pil.report import NO_MATPLOTLIB
 from qpmpc.controllers.monitor import Flag
 from qpmpc.files import json_text, write_bytes, write_text
+from qpmpc.report.csv_text import csv_text
 from qpmpc.report.html import html_page
 from qpmpc.report.provenance import provenance
 from qpmpc.report.table import ShownTable
@@ -163,14 +164,21 @@ def _figure(value: float | None, digits: str) -> str:
 
 def _csv(result: BoardResult) -> str:
     log, expected = result.log, result.expected
-    lines = [
+    header = (
         f"time_s,step_{log.unit},forecast_{log.unit},engine_on,p_eng_w,expected_engine_on,"
         "expected_p_eng_w,status"
+    )
+    rows = [
+        [
+            k,
+            log.step[k],
+            log.forecast[k],
+            int(log.engine_on[k]),
+            f"{log.power_w[k]:.9g}",
+            int(expected.engine_on[k]),
+            f"{expected.power_w[k]:.9g}",
+            "; ".join(Flag(flags).names()) or "ok",
+        ]
+        for k, flags in enumerate(log.flags.tolist())
     ]
-    for k, flags in enumerate(log.flags.tolist()):
-        status = "; ".join(Flag(flags).names()) or "ok"
-        lines.append(
-            f"{k},{log.step[k]},{log.forecast[k]},{int(log.engine_on[k])},{log.power_w[k]:.9g},"
-            f"{int(expected.engine_on[k])},{expected.power_w[k]:.9g},{status}"
-        )
-    return "\n".join(lines) + "\n"
+    return csv_text(header.split(","), rows)

@@ -6,7 +6,7 @@ from typing import Any
 
 from qpmpc.codegen.pil.loop import PilResult
 from qpmpc.codegen.pil.pictures import LINES
-from qpmpc.report.charts import Panel, Series, dashes, held, numbers, over_time, scatter
+from qpmpc.report.charts import Panel, Series, dashes, groups_of, held, lines, only, over_time
 from qpmpc.report.columns import violations_text
 from qpmpc.report.html import html_page
 from qpmpc.report.provenance import provenance
@@ -140,19 +140,24 @@ def _pareto_chart(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     present = {(row["algorithm"], row["precision"]) for row in rows}
     families = {key: style for key, style in LINES.items() if key in present}
     series = []
+    above = [row["fuel_above_dp_percent"] for row in rows]
+    millions = [row["instructions"]["median"] / 1e6 for row in rows]
     for key, (color, style) in families.items():
-        values = [
-            row["fuel_above_dp_percent"]
-            if (row["algorithm"], row["precision"]) == key
-            else float("nan")
-            for row in rows
-        ]
+        own = [(row["algorithm"], row["precision"]) == key for row in rows]
         name = " ".join(key)
-        series.append(Series(name, numbers(values), color, name, dashes(style)))
-    return scatter(
-        [row["instructions"]["median"] / 1e6 for row in rows],
-        "instructions per step, millions",
-        Panel("SOC-balanced fuel above DP, %", series, height=320),
-        [f"K = {row['iterations']}, {row['algorithm']} {row['precision']}" for row in rows],
-        [each.as_group() for each in series],
+        line = Series(name, only(above, own), color, name, dashes(style), joined=True, size=8)
+        series.append(line)
+    panel = Panel(
+        "SOC-balanced fuel above DP, %",
+        series,
+        zero=True,
+        height=320,
+        labels=[
+            f"{row['algorithm']} {row['precision']}, K = {row['iterations']}: {count:.3g} million "
+            f"instructions, {percent:.2f} % above DP"
+            for row, count, percent in zip(rows, millions, above, strict=True)
+        ],
+        texts=[f"K = {row['iterations']}" for row in rows],
     )
+    label = "instructions per step, millions"
+    return lines(millions, label, "millions", [panel], groups_of([panel]), True)

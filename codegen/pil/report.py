@@ -11,6 +11,7 @@ from qpmpc.controllers.monitor import Flag
 from qpmpc.controllers.settings import MhQpSettings
 from qpmpc.files import json_text, write_bytes, write_text
 from qpmpc.report.columns import violations_text
+from qpmpc.report.csv_text import csv_text
 from qpmpc.report.table import ShownTable
 
 FLIPS_SHOWN = 8
@@ -131,12 +132,17 @@ def pareto_table(rows: Sequence[dict[str, Any]]) -> ShownTable:
 
 
 def _csv(result: PilResult) -> str:
-    lines = ["time_s,instructions,engine_on,p_eng_w,python_engine_on,python_p_eng_w,status"]
-    for k, flags in enumerate(result.flags.tolist()):
-        status = "; ".join(Flag(flags).names()) or "ok"
-        lines.append(
-            f"{k},{result.instructions[k]},{int(result.command_on[k])},"
-            f"{result.command_w[k]:.6g},{int(result.reference_on[k])},"
-            f"{result.reference_w[k]:.6g},{status}"
-        )
-    return "\n".join(lines) + "\n"
+    header = "time_s,instructions,engine_on,p_eng_w,python_engine_on,python_p_eng_w,status"
+    rows = [
+        [
+            k,
+            result.instructions[k],
+            int(result.command_on[k]),
+            f"{result.command_w[k]:.6g}",
+            int(result.reference_on[k]),
+            f"{result.reference_w[k]:.6g}",
+            "; ".join(Flag(flags).names()) or "ok",
+        ]
+        for k, flags in enumerate(result.flags.tolist())
+    ]
+    return csv_text(header.split(","), rows)

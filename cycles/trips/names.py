@@ -4,7 +4,8 @@ import re
 from typing import NamedTuple
 
 from qpmpc.errors import InputError
-from qpmpc.names import unknown
+from qpmpc.names import hint, unknown
+from qpmpc.nearest import nearest
 from qpmpc.problems import shown_value
 
 SETS: dict[str, int] = {"train": 200, "judge": 200}
@@ -21,6 +22,8 @@ ALLOWED = (
 
 _OF_SET = re.compile(rf"({'|'.join(SETS)})-([0-9]{{3}})")
 _RANDOM = re.compile(r"random-(0|[1-9][0-9]{0,9})(?:-([1-9][0-9]{0,4})s)?")
+# a name as it may be mistyped: its letters, the first number, the seconds
+_TYPED = re.compile(r"([a-z]{1,20})[-_ ]*([0-9]{1,10})(?:[-_ ]*([0-9]{1,5})s?)?", re.ASCII)
 
 
 class TripName(NamedTuple):
@@ -61,6 +64,17 @@ def looks_like_trip(name: str) -> bool:
     return name.startswith(tuple(f"{group}-" for group in (*SETS, "random")))
 
 
+def near_trips(name: str) -> tuple[str, ...]:
+    """Names of trips that differ from a mistyped one in the letters, in dashes or in zeros."""
+    typed = _TYPED.fullmatch(name.casefold())
+    group = nearest(typed[1], (*SETS, "random")) if typed else ""
+    if not typed or not group:
+        return ()
+    number, seconds = int(typed[2]), f"-{int(typed[3])}s" if typed[3] else ""
+    meant = f"{group}-{number:03d}" if group in SETS else f"{group}-{number}{seconds}"
+    return (meant,) if is_trip(meant) else ()
+
+
 def parse_name(name: str) -> TripName:
     """Take a name apart.
 
@@ -72,7 +86,7 @@ def parse_name(name: str) -> TripName:
     found = _parsed(name)
     if found is None:
         raise InputError(
-            f"unknown trip {shown_value(name)}: use one of {ALLOWED}; "
+            f"unknown trip {shown_value(name)}{hint(name, near_trips(name))} use one of {ALLOWED}; "
             f"SEED 0 .. {SEEDS - 1}, SECONDS {SHORTEST_S} .. {LONGEST_S}, no leading zeros"
         )
     return found

@@ -43,7 +43,7 @@ def pil(
         bool,
         typer.Option(
             "--pareto",
-            help="K = 10, 25, 50, 100 with both precisions and algorithms, or those named: "
+            help="K = 10, 30, 50, 100 with both precisions and algorithms, or those named: "
             "instructions and memory against fuel above DP.",
         ),
     ] = False,

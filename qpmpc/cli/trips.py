@@ -44,7 +44,7 @@ def trips(
     from qpmpc.cli.console import progress_bar, result_console, write_json
     from qpmpc.cli.inputs import check_outputs
     from qpmpc.cycles import cycle_names, load_cycle
-    from qpmpc.cycles.trips import ALLOWED, SETS, is_trip, make_trip, set_names
+    from qpmpc.cycles.trips import ALLOWED, SETS, is_trip, make_trip, near_trips, set_names
     from qpmpc.errors import InputError
     from qpmpc.names import unknown
     from qpmpc.report.table import print_rows
@@ -54,7 +54,7 @@ def trips(
     if name is None and out is not None:
         raise InputError("--out writes one set or trip: name it, e.g. qpmpc trips train --out DIR")
     if name is not None and name not in SETS and not is_trip(name):
-        raise InputError(unknown("trip or set", name, SETS, f", {ALLOWED}"))
+        raise InputError(unknown("trip or set", name, SETS, f", {ALLOWED}", near_trips(name)))
     check_outputs(json_file, out)
     console = result_console(json_file)
     if name is not None and name not in SETS:

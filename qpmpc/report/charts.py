@@ -1,11 +1,12 @@
 """Charts that a page draws itself, as plain data for `web/chart.js`: zoom, cursor, groups.
 
-A chart is panels over one axis. Lines that belong to a group (a controller, say) are left out with
-it. The static picture of the same data stays in the page, for print and without scripts.
+A chart is panels over one axis, or over rows that have names. Lines, points and bars that belong to
+a group (a controller, say) are left out with it. The static picture of the same data stays in the
+page, for print and without scripts.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -21,14 +22,19 @@ DASHED = [6, 4]
 
 @dataclass(frozen=True)
 class Series:
-    """A line.
+    """A line, points or bars.
 
     Attributes
     ----------
     values : one for each value of the axis; those that are not finite leave a gap
     group : what it is left out with; empty: never
     stepped : each value holds until the next
-    aside : shown in its panel, but alone no reason to show the panel
+    aside : a limit, say: shown where the scale of the others reaches, alone no reason for a panel
+    points : without a line
+    size : of its points, pixels; with one a line has points, and points may lie over each other
+    joined : the line leaves no gap
+    hollow : its points are
+    bars : from 0
     """
 
     name: str
@@ -39,6 +45,11 @@ class Series:
     stepped: bool = False
     fill: bool = False
     aside: bool = False
+    points: bool = False
+    joined: bool = False
+    hollow: bool = False
+    bars: bool = False
+    size: int = 0
 
     def as_group(self) -> dict[str, Any]:
         """Return the group of this line as the page lists it, to be left out."""
@@ -53,6 +64,9 @@ class Panel:
     ----------
     zero : 0 is always shown
     span : least and greatest value of the scale; empty: as the lines need
+    x : where its values are, if not where the chart's are; it rises
+    labels : what the cursor says of each value; empty: its place on the axis
+    texts : written beside the values, as far as there is room; empty for most of them
     """
 
     label: str
@@ -61,6 +75,9 @@ class Panel:
     zero: bool = False
     span: list[float] = field(default_factory=list)
     height: int = 170
+    x: list[float | None] = field(default_factory=list)
+    labels: Sequence[str] = ()
+    texts: Sequence[str] = ()
 
 
 def over_time(panels: Sequence[Panel], groups: Sequence[dict[str, Any]] = ()) -> dict[str, Any]:
@@ -71,6 +88,10 @@ def over_time(panels: Sequence[Panel], groups: Sequence[dict[str, Any]] = ()) ->
     groups : name, color and dash of what can be left out
     """
     count = max(len(series.values) for panel in panels for series in panel.series)
+    panels = [
+        replace(panel, series=[replace(s, values=_filled(s.values, count)) for s in panel.series])
+        for panel in panels
+    ]
     return _chart({"count": count, "x_label": "time, s", "x_name": "s"}, panels, groups)
 
 
@@ -80,21 +101,34 @@ def lines(
     unit: str,
     panels: Sequence[Panel],
     groups: Sequence[dict[str, Any]],
+    x_log: bool = False,
 ) -> dict[str, Any]:
-    """Return a chart of lines over any axis; x rises."""
-    return _chart({"x": numbers(x), "x_label": label, "x_name": unit}, panels, groups)
+    """Return a chart over any axis; x rises."""
+    axis = {"x": numbers(x), "x_label": label, "x_name": unit, "x_log": x_log}
+    return _chart(axis, panels, groups)
 
 
-def scatter(
-    x: ArrayLike,
-    label: str,
-    panel: Panel,
-    labels: Sequence[str],
-    groups: Sequence[dict[str, Any]],
+def in_rows(
+    names: Sequence[str], panels: Sequence[Panel], groups: Sequence[dict[str, Any]] = ()
 ) -> dict[str, Any]:
-    """Return a chart of points on a logarithmic axis; x rises, each point has a name."""
-    axis = {"x": numbers(x), "x_label": label, "x_log": True}
-    return _chart(axis | {"points": True, "labels": list(labels)}, [panel], groups)
+    """Return a chart of a row for each name, the first above; values go to the right.
+
+    A panel's own `x` says in which row a value is: 0 for the first, 0.2 for a bit below its middle.
+    """
+    return _chart({"x": list(range(len(names))), "rows": list(names)}, panels, groups)
+
+
+def only(values: Sequence[float], wanted: Sequence[bool]) -> list[float | None]:
+    """Return values with a gap where they are not wanted."""
+    return [value if keep else None for value, keep in zip(numbers(values), wanted, strict=True)]
+
+
+def groups_of(panels: Sequence[Panel]) -> list[dict[str, Any]]:
+    """Return every group of the panels, in their order."""
+    found: dict[str, dict[str, Any]] = {}
+    for each in (series for panel in panels for series in panel.series if series.group):
+        found.setdefault(each.group, each.as_group())
+    return list(found.values())
 
 
 def run_chart(
@@ -128,7 +162,8 @@ def run_chart(
         ]
         count = len(first.trajectory.soc)
         named = zip(("least allowed", "most allowed"), limits, strict=True)
-        panels.append(Panel(label, lines + [_limit(n, value, count) for n, value in named]))
+        allowed = f"{label} (allowed: {limits[0]:g} to {limits[1]:g})"
+        panels.append(Panel(allowed, lines + [_limit(n, value, count) for n, value in named]))
     fuel = [
         Series(style["group"], numbers([0.0, *np.cumsum(run.trajectory.fuel_g)]), **style)
         for run, style in zip(runs, styles, strict=True)
@@ -141,6 +176,11 @@ def numbers(values: ArrayLike) -> list[float | None]:
     """Return values with the digits that a picture shows; None for those not finite."""
     found = np.asarray(values, dtype=float)
     return [float(f"{v:.{DIGITS}g}") if np.isfinite(v) else None for v in found.tolist()]
+
+
+def _filled(values: list[float | None], count: int) -> list[float | None]:
+    """Return values with gaps at the end: trips differ in length."""
+    return values + [None] * (count - len(values))
 
 
 def held(values: ArrayLike) -> list[float | None]:
@@ -210,4 +250,4 @@ def _shown(value: Any) -> Any:
         return shown(value)
     if isinstance(value, dict):
         return _plain(value)
-    return [_shown(each) for each in value] if isinstance(value, list) else value
+    return [_shown(each) for each in value] if isinstance(value, list | tuple) else value

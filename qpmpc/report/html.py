@@ -54,7 +54,7 @@ def preformatted(text: str) -> Markup:
 def web() -> Web:
     """Return what is in every page, read once."""
     licence = _shared("uPlot.LICENSE").replace("*/", "")
-    chart = f"/* uPlot {licence}*/\n{_library()}\n{_shared('chart.js')}"
+    chart = f"/* uPlot {licence}*/\n{_library()}\n{_shared('plot.js')}\n{_shared('chart.js')}"
     script = f"{_shared('page.js')}\n{chart}"
     digest = b64encode(sha256(script.encode()).digest()).decode()
     style = _shared("uPlot.min.css") + _shared("page.css")

@@ -41,7 +41,7 @@ def draw_trajectories(runs: Sequence[Run]) -> bytes:
         _faults(axes, runs)
         tidy(axes)
     splits[0].legend(ncols=3, **LEGEND)
-    soc.legend(ncols=len(runs) + 1, **LEGEND)
+    soc.legend(ncols=len(runs), **LEGEND)
     fuel.set_xlabel("time, s")
     fuel.set_xlim(0, len(runs[0].trajectory.fuel_g))
     figure.align_ylabels(panels)
@@ -117,8 +117,15 @@ def _faults(axes: Axes, runs: Sequence[Run]) -> None:
 
 
 def _limits(soc: Axes, coolant: Axes, run: Run) -> None:
+    """Draw the limits where the scale of the lines reaches them, and say them where it does not."""
     battery, thermal = run.vehicle.battery, run.vehicle.thermal
-    soc.axhline(battery.soc_min, label="limits", **LIMIT)
-    soc.axhline(battery.soc_max, **LIMIT)
-    coolant.axhline(thermal.t_cl_min_degc, **LIMIT)
-    coolant.axhline(thermal.t_cl_max_degc, **LIMIT)
+    for axes, low, high in (
+        (soc, battery.soc_min, battery.soc_max),
+        (coolant, thermal.t_cl_min_degc, thermal.t_cl_max_degc),
+    ):
+        bounds = axes.get_ylim()
+        for value in (low, high):
+            axes.axhline(value, **LIMIT)
+        axes.set_ylim(bounds)
+        quantity = axes.get_ylabel().replace("\n", ", ")
+        axes.set_ylabel(f"{quantity}\nallowed {low:g} to {high:g}")

@@ -1,12 +1,10 @@
 """Trajectories as CSV: one row per second, the unit in the name of each column."""
 
-import csv
-from io import StringIO
-
 import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.controllers.monitor import Flag
+from qpmpc.report.csv_text import csv_text
 from qpmpc.results import Run
 from qpmpc.trajectory import Trajectory
 
@@ -39,15 +37,11 @@ def trajectory_csv(run: Run) -> str:
     """
     trajectory = run.trajectory
     steps = len(trajectory.fuel_g)
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
     states = [_cells(getattr(trajectory, name)) for name in STATES]
     flows = [[*_cells(_flow(trajectory, name)), ""] for name in FLOWS]
     words = [" + ".join(Flag(each).names()) for each in trajectory.flags.tolist()]
     said = [*trajectory.fallback, ""], [*words, ""]
-    writer.writerows(zip(range(steps + 1), *states, *flows, *said, strict=True))
-    return text.getvalue()
+    return csv_text(COLUMNS, zip(range(steps + 1), *states, *flows, *said, strict=True))
 
 
 def _flow(trajectory: Trajectory, name: str) -> NDArray[np.float64]:

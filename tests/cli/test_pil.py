@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from board_log import IDENTITY, bodies, text_of
+from browser import assert_works
 from pages import assert_self_contained
 
 import qpmpc.codegen.pil.loop as loop
@@ -76,6 +77,7 @@ def test_pareto_has_every_iteration_count_beside_the_optimum(cli, trip, tmp_path
     for count in counts:
         assert f"{count:,}" in html
         assert f"{count:,}" in done.err  # the table
+    assert_works(tmp_path / "pareto_short.html", charts=2, tables=1)
 
 
 @needs_tools

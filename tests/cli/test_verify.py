@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from browser import assert_works
 from pages import assert_self_contained
 
 import qpmpc.registry
@@ -63,6 +64,7 @@ def test_all_claims_hold(cli, groups, tmp_path, strict_json):
     html = (tmp_path / "new" / "verify.html").read_text()
     assert "Constant demand" in html
     assert_self_contained(html)
+    assert_works(tmp_path / "new" / "verify.html", charts=0, tables=3)
 
 
 def test_a_failing_check_makes_the_exit_code_1(cli, groups, tmp_path):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import assert_works
 from c_project import need, run
 from pages import assert_self_contained
 
@@ -112,6 +113,7 @@ def test_what_is_written_has_the_figures(result, tmp_path) -> None:
     rows = (tmp_path / "board_nycc_mh-qp_f32.csv").read_text().splitlines()
     assert len(rows) == 1 + SECONDS
     assert rows[1].startswith(f"0,{result.log.step[0]},")
+    assert_works(tmp_path / "board_nycc_mh-qp_f32.html", charts=1, tables=1)
 
 
 def test_a_board_that_computes_something_else_is_found(linux, tmp_path) -> None:

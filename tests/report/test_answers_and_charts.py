@@ -1,7 +1,9 @@
 """The first sentences of the other reports."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from synthetic_study import failing, synthetic
 
@@ -9,11 +11,14 @@ from qpmpc.codegen.board.report import board_answer
 from qpmpc.codegen.pil.page import pil_answer
 from qpmpc.report.charts import Panel, Series, numbers, over_time, run_chart
 from qpmpc.report.study.answer import study_answer
+from qpmpc.report.study.factor_chart import factor_charts
+from qpmpc.report.study.figures import ABOVE_DP, study_table
 from qpmpc.report.study.summary import study_summary
+from qpmpc.verification.benchmark.charts import histogram_chart, pareto_charts
 from qpmpc.verification.benchmark.pareto import Point
-from qpmpc.verification.benchmark.report import benchmark_answer, pareto_chart
+from qpmpc.verification.benchmark.report import benchmark_answer
 from qpmpc.verification.checks import Check
-from qpmpc.verification.checks.report import Results, verification_answer
+from qpmpc.verification.checks.report import Results, nearest_checks, verification_answer
 
 NO_EXCESS = {"soc": 0.0, "t_cl_degc": 0.0, "power_w": 0.0}
 HOLDS = Check("Bounds", "It is below.", 1.0, 0.5)
@@ -37,6 +42,17 @@ def test_verification(checks, first):
     assert "Quick run: fewer cycles and samples." in said
 
 
+def test_what_failed_comes_first_then_what_uses_most_of_its_tolerance():
+    loose = Check("Loose", "It is far below.", 1.0, 0.1)
+    most = Check("Share", "It is above.", 80.0, 100.0, at_least=True)  # 80 % used
+    unknown = Check("Broken", "It is a number.", 1.0, float("nan"))
+    exact = Check("Exact", "It is none.", 0.0, 0.0)
+    groups = [("A", [loose, HOLDS, unknown]), ("B", [most, SKIPPED, FAILS, exact])]
+    found = nearest_checks(Results(True, groups, [1.0]))
+    assert found == [("A", unknown), ("B", FAILS), ("B", most), ("A", HOLDS), ("A", loose)]
+    assert [check.share for _, check in found[1:]] == [2.0, 0.8, 0.5, 0.1]
+
+
 POINTS = [
     Point("fast", "rivals", 0.1, 0.2, (0.5, 0.7), True),
     Point("broken", "rivals", 0.1, 0.3, (0.0, 0.0), False),
@@ -56,11 +72,59 @@ def test_benchmark():
 
 
 def test_points_of_a_benchmark_are_named_and_marked():
-    chart = pareto_chart([*POINTS, Point("dp", "rivals", float("nan"), float("nan"), (0.0,), True)])
-    assert chart["labels"] == ["fast", "broken (not sound)", "exact"]
-    assert chart["panels"][0]["series"][0]["values"] == [0.6, 0.0, 0.1]
-    assert not chart["panels"][0]["log"]  # there is no logarithm of zero
-    assert pareto_chart([]) is None
+    dp = Point("dp", "rivals", float("nan"), float("nan"), (0.0,), True)
+    plane, rows = pareto_charts([*POINTS, dp], [POINTS[0], POINTS[2]])
+    (panel,) = plane["panels"]
+    assert panel["labels"][1] == "broken (not sound): worst step 0.3 ms, fuel 0.00 % above DP"
+    assert panel["texts"] == ["fast", "", "exact"]
+    front, sound, unsound = (each["values"] for each in panel["series"])
+    assert front == sound == [0.6, None, 0.1]
+    assert unsound == [None, 0.0, None]
+    assert not panel["log"]  # there is no logarithm of zero
+    assert rows["rows"] == ["fast", "broken", "exact"]
+    assert rows["panels"][1]["x"] == [0.0, 0.0, 1.0, 1.0, 2.0, 2.0]  # both trips of each
+    assert pareto_charts([], []) == []
+
+
+def test_a_histogram_counts_every_step():
+    quick = SimpleNamespace(candidate=SimpleNamespace(label="quick"), step_ms=np.full((2, 5), 0.1))
+    slow = SimpleNamespace(candidate=SimpleNamespace(label="slow"), step_ms=np.geomspace(1, 9, 50))
+    chart = histogram_chart([quick, slow])
+    edges = chart["x"]
+    counts = [[n or 0 for n in each["values"]] for each in chart["panels"][0]["series"]]
+    assert [sum(each) for each in counts] == [10, 50]
+    (bin_of,) = np.flatnonzero(counts[0])
+    assert edges[bin_of] <= 0.1 <= edges[bin_of + 1]
+    assert len(edges) == len(counts[0])
+
+
+def test_factors_have_a_dot_for_each_run_and_the_medians_of_all():
+    frame, _ = synthetic(1200, vehicles=["prius-nimh"])
+    table = study_table(frame).assign(terrain=["flat", "hills"] * 1800)
+    (chart,) = factor_charts(table, ["vehicle", "controller"], ABOVE_DP, "set.thermal.t_amb_degc")
+    (panel,) = chart["panels"]
+    assert "(a dot for one of 3 runs; median and quantile of all)" in panel["label"]
+    own = table[table["controller"] == "mh-qp"]
+    dots, median, *_ = panel["series"]
+    assert sum(value is not None for value in dots["values"]) == 400
+    expected = own.groupby("set.thermal.t_amb_degc")["fuel_above_dp_percent"].median()
+    found = [value for value in median["values"] if value is not None]
+    assert found == pytest.approx(expected.tolist(), rel=1e-4)
+    worst = own.loc[own["fuel_above_dp_percent"].idxmax()]
+    assert any(text.startswith(f"run {worst['run']}, ") for text in panel["labels"])
+    (by_terrain,) = factor_charts(table, ["vehicle", "controller"], ABOVE_DP, "terrain")
+    assert by_terrain["rows"] == ["hills", "flat"]
+    middle = by_terrain["panels"][0]["series"][1]["values"]
+    expected = own.groupby("terrain")["fuel_above_dp_percent"].median()[["hills", "flat"]]
+    found = [value for value in middle if value is not None]
+    assert found == pytest.approx(expected.tolist(), rel=1e-4)
+
+
+def test_trips_of_different_length_share_an_axis():
+    chart = over_time([Panel("a", [Series("a", [1.0, 2.0], "#000000")]),
+                       Panel("b", [Series("b", [1.0], "#000000")])])  # fmt: skip
+    assert chart["count"] == 2
+    assert chart["panels"][1]["series"][0]["values"] == [1.0, None]
 
 
 def pil_row(**changes):

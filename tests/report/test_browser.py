@@ -1,29 +1,22 @@
 """Reports in a real browser, without network: what their scripts do."""
 
 import csv
-import shutil
-from collections.abc import Iterator
+from contextlib import ExitStack
 
 import pytest
+from browser import assert_works, chromium
+from browser import opened as opened_in
 
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.report.compare_html import compare_html
 from qpmpc.report.trajectories import draw_trajectories
 from qpmpc.results import compare_runs
 
-CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
-FLAGS = ("--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking")
-
-sync_api = pytest.importorskip("playwright.sync_api")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium")
-
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[object]:
-    with sync_api.sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+def browser():
+    with chromium() as started:
         yield started
-        started.close()
 
 
 @pytest.fixture(scope="module")
@@ -37,25 +30,8 @@ def file(runs, tmp_path_factory):
 
 @pytest.fixture
 def opened(browser, file):
-    """Open the page as a user would, and see to it that nothing was asked for or went wrong."""
-    said: list[str] = []
-    contexts = []
-
-    def open_page(**keywords):
-        context = browser.new_context(offline=True, **keywords)
-        contexts.append(context)
-        page = context.new_page()
-        page.on("console", lambda message: said.append(message.text))
-        page.on("pageerror", lambda error: said.append(str(error)))
-        page.on("request", lambda request: said.append(request.url))
-        page.goto(file.as_uri())
-        return page
-
-    yield open_page
-    for context in contexts:
-        context.close()
-    asked = [text for text in said if not text.startswith(("data:image/png", "blob:"))]
-    assert asked == [file.as_uri()] * len(contexts)
+    with ExitStack() as stack:
+        yield lambda **keywords: stack.enter_context(opened_in(browser, file, **keywords))
 
 
 def cells(page, column):
@@ -105,6 +81,20 @@ def test_the_csv_is_the_table(opened, rows, tmp_path):
     assert [line["controller"] for line in lines] == [row["controller"] for row in rows]
     assert [line["cycle"] for line in lines] == [row["cycle"] for row in rows]
     assert [line["fuel g"] for line in lines] == [f"{row['fuel_g']:.1f}" for row in rows]
+
+
+def test_a_downloaded_cell_is_no_formula(opened, tmp_path):
+    cells = ["=1+1", "+cmd|' /C calc'!A0", "@SUM(A1)", "-2+3", "-0.5", "+0.3 [-0.1, 0.7]", "-"]
+    page = opened()
+    page.locator("table[data-file=compare] tbody tr").first.evaluate(
+        "(row, cells) => cells.forEach((text, i) => { row.cells[i].textContent = text; })", cells
+    )
+    with page.expect_download() as waiting:
+        page.locator("button", has_text="Download CSV").first.click()
+    waiting.value.save_as(tmp_path / "compare.csv")
+    with (tmp_path / "compare.csv").open(encoding="utf-8", newline="") as text:
+        _, first, *_ = csv.reader(text)
+    assert first[: len(cells)] == [*(f"'{cell}" for cell in cells[:4]), *cells[4:]]
 
 
 def test_a_controller_is_left_out_of_every_panel(opened):
@@ -159,28 +149,8 @@ def test_the_value_under_the_cursor_is_shown_in_every_panel(opened, runs):
     assert float(found[1]) == pytest.approx(expected, abs=1e-4)  # four digits are shown
 
 
-def test_light_dark_and_print(opened):
-    paper = "getComputedStyle(document.body).backgroundColor"
-    page = opened(color_scheme="dark")
-    dark = page.evaluate(paper)
-    page.locator("button.theme").click()
-    assert page.evaluate(paper) == "rgb(255, 255, 255)"
-    page.locator("button.theme").click()
-    assert page.evaluate(paper) == dark != "rgb(255, 255, 255)"
-    page.emulate_media(media="print")
-    assert page.evaluate(paper) == "rgb(255, 255, 255)"
-    assert page.locator("figure.chart > img").is_visible()
-    assert not page.locator(".plots").is_visible()
-    assert not page.locator("button", has_text="Download CSV").first.is_visible()
-
-
-def test_a_narrow_window_scrolls_only_its_tables(opened):
-    page = opened(viewport={"width": 360, "height": 700})
-    assert page.evaluate("document.documentElement.scrollWidth") <= 360
-    widths = "[...document.querySelectorAll('.uplot')].map(plot => plot.offsetWidth)"
-    assert max(page.evaluate(widths)) <= 360
-    page.set_viewport_size({"width": 900, "height": 700})
-    page.wait_for_function(f"Math.min(...{widths}) > 700")  # the charts follow the window
+def test_what_all_pages_share(browser, file):
+    assert_works(file, charts=1, tables=3, browser=browser)
 
 
 def test_without_scripts_the_pictures_are_there(opened):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from browser import assert_works
 from hostile import TEXT, is_harmless
 from pages import Page
 from synthetic_study import failing, synthetic
@@ -145,3 +146,4 @@ def test_files(tmp_path, studies):
     assert line.startswith(f"{tmp_path / 'comparison.html'} written")
     names = {file.name for file in tmp_path.iterdir()}
     assert names == {"comparison.html", "comparison.json", "comparison.md", "pairs.png"}
+    assert_works(tmp_path / "comparison.html", charts=2, tables=6)

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from browser import assert_works
 from hostile import AS_SHOWN, TEXT, is_harmless
 from pages import Page, assert_self_contained
 from pandas import DataFrame
@@ -202,6 +203,10 @@ def test_files(written, summary):
     assert "factor_set.thermal.t_amb_degc.png" in pictures
 
 
+def test_in_a_browser(written):
+    assert_works(written[0] / "report.html", charts=7, tables=17)
+
+
 EDGES = {
     "empty": lambda frame: frame.iloc[:0],
     "no column": lambda frame: DataFrame(),
@@ -236,8 +241,8 @@ def test_nothing_is_too_strange_to_report(name):
     assert is_harmless(json_text(summary))  # strict JSON: no NaN
     assert is_harmless(summary_markdown(summary))
     # one of the pictures of factors stands for all: they take most of the time
-    pictures, remarks = study_pictures(frame, summary | {"factors": summary["factors"][:1]})
-    assert Page(study_page(frame, study, summary, pictures, remarks)).text
+    drawn = study_pictures(frame, summary | {"factors": summary["factors"][:1]})
+    assert Page(study_page(frame, study, summary, drawn)).text
 
 
 def test_hostile_names_are_inert(tmp_path):

@@ -6,6 +6,7 @@ from io import BytesIO
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from browser import assert_works
 from pages import assert_self_contained
 
 from qpmpc.controllers.settings import ControllerSettings
@@ -126,3 +127,4 @@ def test_report_is_self_contained(driven, short, tmp_path):
     assert "&lt;qpalm&gt;" in page
     assert benchmark_table(result.rows).row_count == 2
     assert solvers_table(result.solvers).row_count == 2
+    assert_works(tmp_path / "benchmark.html", charts=5, tables=2)

@@ -1,5 +1,6 @@
 """The cache of optima between real processes: one computes, the others wait for it."""
 
+import logging
 import os
 import signal
 import subprocess
@@ -123,6 +124,18 @@ def test_without_locks_it_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     (tmp_path / f"dp-{key[:32]}.lock").mkdir()
     assert solve_dp(CYCLE, load_vehicle(), COARSE).admissible
     assert cache.load(key) is not None
+
+
+def test_the_log_says_what_was_not_computed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setenv("QPMPC_CACHE_DIR", str(tmp_path))
+    caplog.set_level(logging.INFO, logger="qpmpc")
+    computed = solve_dp(CYCLE, load_vehicle(), COARSE)
+    assert "taken from" not in caplog.text
+    taken = solve_dp(CYCLE, load_vehicle(), COARSE)
+    assert f"optimum of steady taken from {tmp_path}" in caplog.messages
+    assert taken.fuel_total_g == computed.fuel_total_g
 
 
 def test_the_longest_unused_goes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,14 +20,14 @@ from qpmpc.report.style import (
 from qpmpc.verification.benchmark.drive import Drive
 
 PAPER_STEP_MS = 670.0
+COLORS = (VERMILION, BLUE, GREEN, PURPLE, ORANGE, GREY, BLACK)
 
 
 def draw_histogram(drives: Sequence[Drive]) -> bytes:
     """Distribution of the times of all steps of some candidates; returns a PNG."""
     figure = Figure(figsize=(8.0, 3.6), layout="constrained")
     axes = figure.subplots()
-    colors = (VERMILION, BLUE, GREEN, PURPLE, ORANGE, GREY, BLACK)
-    for drive, color in zip(drives, colors, strict=False):
+    for drive, color in zip(drives, COLORS, strict=False):
         times = drive.step_ms.ravel()
         bins = np.geomspace(times.min(), times.max() * 1.001, 60).tolist()
         axes.hist(

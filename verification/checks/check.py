@@ -1,7 +1,7 @@
 """One check: the claim, the measured value, and whether the claim holds."""
 
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, nan
 from typing import Any
 
 
@@ -40,6 +40,14 @@ class Check:
         if self.at_least:
             return self.measured >= self.tolerance
         return self.measured <= self.tolerance
+
+    @property
+    def share(self) -> float:
+        """Share of the tolerance that is used, 1 at its end; nan without a size of either."""
+        found, allowed = abs(self.measured), abs(self.tolerance)
+        if self.at_least:
+            found, allowed = allowed, found
+        return found / allowed if allowed > 0.0 and isfinite(found) else nan
 
     @property
     def verdict(self) -> str:

@@ -1,11 +1,14 @@
 """The HTML report of a verification: one self-contained file."""
 
 from dataclasses import dataclass, field
+from math import isfinite
 from typing import Any
 
 from qpmpc.report.html import html_page
 from qpmpc.report.provenance import provenance
 from qpmpc.verification.checks.check import Check
+
+NEAREST = 10  # checks shown that come nearest to their tolerance
 
 
 @dataclass
@@ -73,6 +76,15 @@ def verification_answer(results: Results) -> list[str]:
     return [*sentences, f"It took {sum(results.seconds):.0f} s."]
 
 
+def nearest_checks(results: Results) -> list[tuple[str, Check]]:
+    """Return group and check of all that failed, then of those that use most of their tolerance."""
+    found = [(title, check) for title, checks in results.groups for check in checks]
+    failed = [each for each in found if not each[1].passed]
+    others = [e for e in found if e[1].passed and not e[1].skipped and isfinite(e[1].share)]
+    others.sort(key=lambda each: -each[1].share)
+    return [*failed, *others[:NEAREST]]
+
+
 def verification_html(results: Results) -> str:
     """Return the report."""
     return html_page(
@@ -81,6 +93,7 @@ def verification_html(results: Results) -> str:
         title="Verification",
         answer=verification_answer(results),
         results=results,
+        nearest=nearest_checks(results),
         figure=figure,
         provenance=provenance(),
     )

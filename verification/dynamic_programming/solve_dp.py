@@ -1,5 +1,6 @@
 """Entry points: solve with cached results, and the study of convergence."""
 
+import logging
 from collections.abc import Callable
 
 from qpmpc.cycles import Cycle
@@ -10,6 +11,7 @@ from qpmpc.verification.dynamic_programming.solution import DpSolution
 from qpmpc.verification.dynamic_programming.threads import default_threads
 
 Progress = Callable[[float], None]
+_log = logging.getLogger(__name__)
 
 
 def solve_dp(
@@ -51,6 +53,7 @@ def solve_dp(
                 solution = _solve(cycle, vehicle, settings, threads, report)
                 cache.store(key, solution)
                 return solution
+    _log.info("optimum of %s taken from %s", cycle.name, cache.folder())
     report(1.0)
     return known
 

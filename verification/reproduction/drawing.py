@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from qpmpc.report.charts import run_chart
+from qpmpc.report.charts import dashes, run_chart
 from qpmpc.report.style import BLACK, GREEN, LIMIT, ORANGE, line_style, tidy
 from qpmpc.results import Run
 from qpmpc.verification.reproduction.study import Study
@@ -27,6 +27,11 @@ def style(label: str) -> dict[str, Any]:
 def color(label: str) -> str:
     """Colour of a variant."""
     return str(style(label)["color"])
+
+
+def look(label: str) -> dict[str, Any]:
+    """Colour and dashes of a variant in a chart."""
+    return {"color": color(label), "dash": dashes(style(label)["linestyle"])}
 
 
 def panels(count: int, unit_in: float = 1.55, **keywords: Any) -> tuple[Figure, list[Axes]]:

@@ -1,9 +1,8 @@
 """Pictures and tables of the reproduction, each with its numbers as CSV."""
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from io import BytesIO, StringIO
+from io import BytesIO
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from qpmpc.files import write_bytes, write_text
+from qpmpc.report.csv_text import csv_text
 from qpmpc.report.style import png
 
 Cell = str | float | int | bool | None
@@ -43,7 +43,7 @@ class Picture:
         write_bytes(folder / f"{self.name}.png", image)
         write_bytes(folder / f"{self.name}.svg", _svg(self.figure))
         rows = zip_longest(*self.data.values(), fillvalue="")
-        write_text(folder / f"{self.name}.csv", _csv(list(self.data), rows))
+        write_text(folder / f"{self.name}.csv", csv_text(list(self.data), rows))
         return image
 
 
@@ -67,7 +67,7 @@ class Table:
 
     def write(self, folder: Path) -> None:
         """Write CSV."""
-        write_text(folder / f"{self.name}.csv", _csv(self.columns, self.rows))
+        write_text(folder / f"{self.name}.csv", csv_text(self.columns, self.rows))
 
     def text(self) -> list[list[str]]:
         """Cells as the report shows them."""
@@ -98,11 +98,3 @@ def _svg(figure: Figure) -> bytes:
     with mpl.rc_context({"svg.hashsalt": "qpmpc", "svg.fonttype": "none"}):
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     return buffer.getvalue()
-
-
-def _csv(columns: Sequence[str], rows: Any) -> str:
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows([["" if cell is None else cell for cell in row] for row in rows])
-    return text.getvalue()

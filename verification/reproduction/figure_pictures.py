@@ -8,6 +8,12 @@ from qpmpc.vehicle.engine import alpha
 from qpmpc.verification.reproduction import paper
 from qpmpc.verification.reproduction.drawing import WIDTH_IN, color
 from qpmpc.verification.reproduction.exhibits import Picture
+from qpmpc.verification.reproduction.figure_charts import (
+    alpha_chart,
+    bars_chart,
+    distances_chart,
+    losses_chart,
+)
 from qpmpc.verification.reproduction.study import Study
 from qpmpc.verification.reproduction.tables import LABELS, printed_name
 from qpmpc.verification.reproduction.variants import OPTIMUM, OURS, PAPER_GRID, RULES, baseline
@@ -49,6 +55,13 @@ def alpha_picture(study: Study) -> Picture:
             "alpha_low": low.tolist(),
             "alpha_high": high.tolist(),
         },
+        alpha_chart(
+            temperature,
+            {
+                f"this plant, k = {cold.k:g}": used,
+                **{f"k = {k:g}": curve for k, curve in zip(K_RANGE, (low, high), strict=True)},
+            },
+        ),
     )
 
 
@@ -72,8 +85,8 @@ def fuel_picture(study: Study) -> Picture:
         LABELS,
         "fuel",
         "Fuel of all controllers",
-        "SOC-balanced fuel; above each bar the saving over the rules, and below it the paper's "
-        "where it prints one.",
+        "SOC-balanced fuel, its difference from the rules, and the paper's where it prints one: "
+        "in the page under the cursor, in the files in brackets.",
     )
 
 
@@ -159,7 +172,7 @@ def _bars(study: Study, labels: list[str], name: str, title: str, caption: str) 
     grid[0, 0].set_ylabel("balanced fuel, g (axis cut)")
     grid[1, 0].set_ylabel("mean time per step, ms\n(crosses: the paper's)")
     figure.suptitle(f"{title}; in brackets the paper's saving", fontsize=11)
-    return Picture(name, title, caption, figure, data)
+    return Picture(name, title, caption, figure, data, bars_chart(study, labels))
 
 
 def robustness_picture(study: Study) -> Picture:
@@ -192,7 +205,7 @@ def robustness_picture(study: Study) -> Picture:
     return Picture(
         "robustness",
         "Wrong forecasts",
-        "A dot is a trip, a bar the mean of its kind. Below zero the wrong forecast happened to "
+        "A dot is a trip, a bar or ring the mean of its kind. Below zero the forecast happened to "
         "save fuel, because the plan's model is not the plant.",
         figure,
         {
@@ -211,6 +224,7 @@ def robustness_picture(study: Study) -> Picture:
                 "fallback_steps",
             )
         },
+        losses_chart(study),
     )
 
 
@@ -252,4 +266,5 @@ def cycles_picture(study: Study) -> Picture:
                 for label in labels
             ],
         },
+        distances_chart(study, labels, OURS),
     )

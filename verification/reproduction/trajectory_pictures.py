@@ -1,12 +1,16 @@
 """Pictures over time: baseline, horizons, all controllers, costates."""
 
+from typing import Any
+
 import numpy as np
 
-from qpmpc.report.style import BLACK, BLUE, ORANGE, PURPLE
+from qpmpc.report.charts import Panel, Series, groups_of, held, lines, numbers, over_time
+from qpmpc.report.style import BLACK, BLUE, GREY, ORANGE, PURPLE
 from qpmpc.verification.reproduction.drawing import (
     chart,
     engine_panel,
     finish,
+    look,
     panels,
     series,
     speed_panel,
@@ -45,9 +49,12 @@ def horizon_picture(study: Study) -> Picture:
     cycles = [cycle.name for cycle in study.extent.cycles]
     figure, axes = panels(len(cycles), 2.3)
     data: dict[str, object] = {}
+    soc_panels = []
     for panel, cycle in zip(axes, cycles, strict=True):
+        soc_panels.append(Panel(f"{cycle}: SOC", []))
         for label in labels:
             soc = study.runs[cycle, label].trajectory.soc
+            soc_panels[-1].series.append(Series(label, numbers(soc), group=label, **look(label)))
             panel.plot(soc, label=label, **style(label))
             data[f"{cycle} {label} soc"] = soc.tolist()
         panel.set_ylabel("SOC")
@@ -59,6 +66,7 @@ def horizon_picture(study: Study) -> Picture:
         "With a longer horizon the SOC moves more as in dynamic programming.",
         finish(figure, axes, "SOC of the baseline for H = 20 and 100 s, and of DP", axes[0]),
         {"time_s": range(longest), **data},  # type: ignore[dict-item]
+        over_time(soc_panels, groups_of(soc_panels)),
     )
 
 
@@ -124,7 +132,64 @@ def thermal_picture(study: Study, cycle: str) -> Picture:
             "t_cl_costate_g_per_k": best.t_cl_costate_g_per_k.tolist(),
             "heat_costate_g_per_mj": best.heat_costate_g_per_mj.tolist(),
         },
+        _thermal_chart(study, cycle),
     )
+
+
+def _thermal_chart(study: Study, cycle: str) -> dict[str, Any]:
+    best, trajectory = study.optima[cycle], study.runs[cycle, OPTIMUM].trajectory
+    ours = study.runs[cycle, OURS].trajectory.t_cl_degc
+    coolant = [
+        Series(OURS, numbers(ours), group=OURS, **look(OURS)),
+        Series(OPTIMUM, numbers(best.t_cl_degc), group=OPTIMUM, **look(OPTIMUM)),
+    ]
+    speed = Series("speed", held(3.6 * trajectory.speed_mps), GREY, fill=True, stepped=True)
+    engine = Series("engine", held(trajectory.p_eng_w / 1e3), ORANGE, fill=True, stepped=True)
+    worth_mg, worth_g = 1e3 * best.t_cl_costate_g_per_k, best.soc_costate_g / 100.0
+    panels = [
+        Panel("speed, km/h", [speed], zero=True, height=110),
+        Panel(f"{OPTIMUM}: engine power, kW", [engine]),
+        Panel(f"{OPTIMUM}: SOC", [Series("SOC", numbers(best.soc), BLUE)]),
+        Panel("coolant, °C", coolant),
+        Panel("worth of a kelvin of coolant, mg", [Series("worth", numbers(worth_mg), PURPLE)]),
+        Panel("worth of 0.01 of SOC, g", [Series("worth", numbers(worth_g), BLUE)]),
+    ]
+    return over_time(panels, groups_of(panels))
+
+
+def _concept_chart(study: Study) -> dict[str, Any]:
+    panels = []
+    seconds = 0
+    for shot in study.snapshots:
+        stages, x = shot.plan.stages, shot.plan.x
+        used = stages.duration_s > 0.0
+        ends = shot.step + np.cumsum(stages.duration_s[used])
+        road = shot.truth.battery_side_w(study.vehicle) / 1e3
+        seconds = max(seconds, len(road))
+        at = np.unique([*range(len(road)), *ends[ends < len(road)]])
+        # the stage that a time is in; before the first there is none
+        stage = np.searchsorted(ends, at, side="right").clip(max=len(ends) - 1)
+        planned = np.where(at >= shot.step, stages.net_w[used][stage] / 1e3, np.nan)
+        tint = look(shot.label)["color"]
+        panels += [
+            Panel(
+                f"{shot.label}, {int(used.sum())} stages at {shot.step} s: net power, kW",
+                [
+                    Series("the road", numbers(road[at.astype(int)]), GREY, stepped=True),
+                    Series("stages of the horizon", numbers(planned), tint, stepped=True),
+                ],
+                x=numbers(at),
+            ),
+            *(
+                Panel(
+                    f"{shot.label}: planned {what}",
+                    [Series("plan", numbers(x[used, i]), tone, joined=True, size=5)],
+                    x=numbers(ends),
+                )
+                for i, what, tone in ((0, "SOC", BLUE), (1, "coolant, °C", ORANGE))
+            ),
+        ]
+    return lines(np.arange(seconds + 1), "time, s", "s", panels, [])
 
 
 def concept_picture(study: Study) -> Picture:
@@ -183,4 +248,5 @@ def concept_picture(study: Study) -> Picture:
         "its own duration: their places in the block are not known and do not matter.",
         finish(figure, axes, f"{name}: horizon of the QP at one step"),
         data,  # type: ignore[arg-type]
+        _concept_chart(study),
     )

@@ -7,6 +7,8 @@ from typing import Any
 
 from qpmpc.report.html import html_page
 
+Charts = dict[str, Any] | list[dict[str, Any]]
+
 
 @dataclass(frozen=True)
 class Table:
@@ -37,7 +39,7 @@ class Section:
     pictures: Sequence[tuple[str, str]] = ()
     texts: Sequence[tuple[str, str]] = ()
     folded: Sequence[tuple[str, Sequence[Table]]] = field(default=())
-    charts: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+    charts: Mapping[str, Charts] = field(default_factory=dict)
 
 
 def page(title: str, answer: Sequence[str], quiet: str, sections: Sequence[Section]) -> str:
@@ -69,4 +71,4 @@ def chosen(pictures: Mapping[str, bytes], start: str) -> list[tuple[str, str]]:
 
 def table_of(data: Mapping[str, str]) -> Table:
     """Return names and values as a table."""
-    return Table(("", ""), [(name, text) for name, text in data.items()], names=2)
+    return Table(("what", "value"), [(name, text) for name, text in data.items()], names=2)

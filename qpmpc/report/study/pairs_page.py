@@ -17,6 +17,7 @@ from qpmpc.report.study.pairs import (
     NO_PAIRS,
     TITLES,
 )
+from qpmpc.report.study.pairs_chart import pairs_charts
 from qpmpc.report.study.pairs_tables import comparison_table, matched_table
 from qpmpc.report.study.pictures import INK, LONGEST, shown_range
 from qpmpc.report.style import BLACK, line_style, png, tidy
@@ -27,18 +28,7 @@ DIFFERENCE_DIGITS = 3
 
 def comparison_pictures(comparison: Mapping[str, Any]) -> dict[str, bytes]:
     """Draw run against run, and the sorted differences; PNG by name."""
-    pairs = comparison["pairs"]
-    above = any(pair[ABOVE] is not None and pair["controller"] != OPTIMUM for pair in pairs)
-    kind = ABOVE if above else FUEL
-    sides = ("above_dp_a_percent", "above_dp_b_percent") if above else ("fuel_a_g", "fuel_b_g")
-    shown = [
-        pair
-        for pair in pairs
-        if pair[kind] is not None and not (above and pair["controller"] == OPTIMUM)
-    ]
-    # controllers that the compared settings do not reach would only stretch the axes
-    changed = {pair["controller"] for pair in shown if abs(pair[kind]) > EQUAL}
-    shown = [pair for pair in shown if pair["controller"] in changed] or shown
+    kind, sides, what, shown = shown_pairs(comparison)
     if not shown:
         return {}
     figure = Figure(figsize=(7.5, 3.6), layout="constrained")
@@ -58,7 +48,6 @@ def comparison_pictures(comparison: Mapping[str, Any]) -> dict[str, bytes]:
         percent = 100.0 * (np.arange(own.sum()) + 0.5) / own.sum()
         sorted_.plot(percent, np.sort(differences[own]), label=label, **style)
     sorted_.axhline(0.0, color=BLACK, linewidth=0.7)
-    what = "fuel above DP, %" if above else "SOC-balanced fuel, g"
     scatter.set(xlabel=f"{what}, A", ylabel=f"{what}, B", xlim=(low, high), ylim=(low, high))
     sorted_.set(
         xlabel="pairs, sorted, %",
@@ -69,6 +58,25 @@ def comparison_pictures(comparison: Mapping[str, Any]) -> dict[str, bytes]:
     for axes in (scatter, sorted_):
         tidy(axes)
     return {"pairs": png(figure)}
+
+
+def shown_pairs(
+    comparison: Mapping[str, Any],
+) -> tuple[str, tuple[str, str], str, list[dict[str, Any]]]:
+    """Return key of the difference, keys of A and B, what they are, and the pairs to draw."""
+    pairs = comparison["pairs"]
+    above = any(pair[ABOVE] is not None and pair["controller"] != OPTIMUM for pair in pairs)
+    kind = ABOVE if above else FUEL
+    sides = ("above_dp_a_percent", "above_dp_b_percent") if above else ("fuel_a_g", "fuel_b_g")
+    shown = [
+        pair
+        for pair in pairs
+        if pair[kind] is not None and not (above and pair["controller"] == OPTIMUM)
+    ]
+    # controllers that the compared settings do not reach would only stretch the axes
+    changed = {pair["controller"] for pair in shown if abs(pair[kind]) > EQUAL}
+    shown = [pair for pair in shown if pair["controller"] in changed] or shown
+    return kind, sides, "fuel above DP, %" if above else "SOC-balanced fuel, g", shown
 
 
 def comparison_page(comparison: Mapping[str, Any], pictures: Mapping[str, bytes]) -> str:
@@ -86,6 +94,7 @@ def comparison_page(comparison: Mapping[str, Any], pictures: Mapping[str, bytes]
         for kind, title in TITLES.items()
         if any(group["differences"][kind]["n"] for group in comparison["groups"])
     ]
+    kind, sides, what, shown = shown_pairs(comparison)
     quiet = f"A: {a['name']}, {a['runs']:,} runs. B: {b['name']}, {b['runs']:,} runs."
     sections = [
         Section(
@@ -95,10 +104,11 @@ def comparison_page(comparison: Mapping[str, Any], pictures: Mapping[str, bytes]
         ),
         Section(
             "Run by run",
-            ["Left: each pair; on the line both are equal. Right: sorted differences."]
+            ["Each pair of runs, and the differences that a share of the pairs does not exceed."]
             if pictures
             else [NO_PAIRS],
             pictures=chosen(pictures, ""),
+            charts={"pairs": pairs_charts(shown, kind, sides, what, TITLES[kind])} if shown else {},
         ),
         Section("What was matched", tables=[Table(*matched_table(comparison), names)]),
         _changes(comparison),

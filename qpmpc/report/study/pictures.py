@@ -191,18 +191,26 @@ def _scatter(
     color = style["color"]
     alpha = float(np.clip(INK / len(x), 0.04, 0.6))
     axes.plot(x, y, "o", color=color, markersize=2.6, alpha=alpha, markeredgewidth=0.0)
-    order = np.argsort(x, kind="stable")
-    bins = _bins(x[order])
-    middle = [float(np.median(x[order][part])) for part in bins]
-    median = [float(np.median(y[order][part])) for part in bins]
+    middle, curves = running(x, y, measure)
+    median = curves.pop("median")
     axes.plot(middle, median, color=BLACK, linewidth=2.6)
     axes.plot(middle, median, "o-", color=color, linewidth=1.6, markersize=2.5,
               label=f"{short(label, LONGEST)}: median")  # fmt: skip
-    if all(len(y[part]) >= PER_BIN for part in bins):
-        tail, quantile = measure.tail
-        worst = [float(np.quantile(y[order][part], quantile)) for part in bins]
+    for tail, worst in curves.items():
         axes.plot(middle, worst, color=color, linewidth=1.3, linestyle=(0, (3, 2)),
                   label=f"{short(label, LONGEST)}: {tail}")  # fmt: skip
+
+
+def running(x: Floats, y: Floats, measure: Measure) -> tuple[list[float], dict[str, list[float]]]:
+    """Return middles of x, over them the median of y and, of enough runs, its bad quantile."""
+    order = np.argsort(x, kind="stable")
+    bins = _bins(x[order])
+    middle = [float(np.median(x[order][part])) for part in bins]
+    curves = {"median": [float(np.median(y[order][part])) for part in bins]}
+    if all(len(y[part]) >= PER_BIN for part in bins):
+        tail, quantile = measure.tail
+        curves[tail] = [float(np.quantile(y[order][part], quantile)) for part in bins]
+    return middle, curves
 
 
 def _bins(ordered: Floats) -> list[slice]:
@@ -223,20 +231,9 @@ def _boxes(
     styles: dict[str, dict[str, Any]],
 ) -> None:
     """Draw a row per category, with a box per controller."""
-    together = [value for _, part in lines for value in distinct(part, column)]
-    values = list(dict.fromkeys(together))
-    if len(values) > MOST_BOXES:
-        medians = {
-            value: max(
-                (-1 if measure.worse == "low" else 1)
-                * float(part.loc[part[column] == value, measure.key].median())
-                for _, part in lines
-                if (part[column] == value).any()
-            )
-            for value in values
-        }
-        values = sorted(values, key=lambda value: medians[value], reverse=True)[:MOST_BOXES]
-        axes.set_ylabel(f"the {MOST_BOXES} worst of {len(medians)}")
+    values, count = shown_categories(lines, measure, column)
+    if count > len(values):
+        axes.set_ylabel(f"the {MOST_BOXES} worst of {count}")
     height = 0.8 / len(lines)
     for i, (controller, part) in enumerate(lines):
         color = styles[controller]["color"]
@@ -254,3 +251,24 @@ def _boxes(
     axes.invert_yaxis()
     if len(lines) > 1:
         axes.legend(loc="best", fontsize=7.5, framealpha=0.8)
+
+
+def shown_categories(
+    lines: Sequence[tuple[str, "DataFrame"]], measure: Measure, column: str
+) -> tuple[list[Any], int]:
+    """Return the categories that are drawn, of many those with the worst medians, and how many."""
+    together = [value for _, part in lines for value in distinct(part, column)]
+    values = list(dict.fromkeys(together))
+    if len(values) <= MOST_BOXES:
+        return values, len(values)
+    medians = {
+        value: max(
+            (-1 if measure.worse == "low" else 1)
+            * float(part.loc[part[column] == value, measure.key].median())
+            for _, part in lines
+            if (part[column] == value).any()
+        )
+        for value in values
+    }
+    worst = sorted(values, key=lambda value: medians[value], reverse=True)
+    return worst[:MOST_BOXES], len(values)

@@ -7,6 +7,7 @@ from qpmpc.report.columns import NONE, number
 from qpmpc.report.html import preformatted
 from qpmpc.report.study.answer import runs_text, study_answer
 from qpmpc.report.study.distribution_chart import distribution_chart
+from qpmpc.report.study.factor_chart import factor_charts
 from qpmpc.report.study.figures import (
     ABOVE_DP,
     MEASURES,
@@ -23,6 +24,7 @@ from qpmpc.report.study.pictures import column_text, draw_distribution, draw_fac
 from qpmpc.report.study.worst import (
     DRAWN,
     MOST_FAILED,
+    Drawn,
     Rerun,
     commands,
     draw_worst,
@@ -40,7 +42,7 @@ MOST_COLUMNS = 8  # of groups, in the table of factors
 
 def study_pictures(
     frame: "DataFrame", summary: Mapping[str, Any], rerun: Rerun | None = None
-) -> tuple[dict[str, bytes], list[str]]:
+) -> Drawn:
     """Draw the pictures of a study.
 
     Parameters
@@ -48,33 +50,26 @@ def study_pictures(
     frame : one row per run
     summary : as `study_summary` returns it
     rerun : drives the run of a row again, for the trajectories of the worst; None: without them
-
-    Returns
-    -------
-    pictures (PNG) by name, and a line for each that could not be made
     """
     table, columns = study_table(frame), summary["grouped_by"]
     measure, _ = main_measure(table)
-    drawn = {
+    made = {
         f"distribution_{each.key}": draw_distribution(table, columns, each)
         for each in dict.fromkeys((measure, ABOVE_DP, SAVING))
     }
     for factor in summary["factors"]:
         column = factor["column"]
-        drawn[f"factor_{column}"] = draw_factor(table, columns, measure, column)
-    worst: dict[str, bytes] = {}
-    remarks: list[str] = []
-    if rerun is not None:
-        worst, remarks = draw_worst(frame, table, measure, rerun)
-    return {name: data for name, data in drawn.items() if data is not None} | worst, remarks
+        made[f"factor_{column}"] = draw_factor(table, columns, measure, column)
+    drawn = Drawn() if rerun is None else draw_worst(frame, table, measure, rerun)
+    drawn.pictures = {k: data for k, data in made.items() if data is not None} | drawn.pictures
+    return drawn
 
 
 def study_page(
     frame: "DataFrame",
     study: Study,
     summary: Mapping[str, Any],
-    pictures: Mapping[str, bytes],
-    remarks: list[str],
+    drawn: Drawn,
 ) -> str:
     """Return the report of a study.
 
@@ -82,8 +77,9 @@ def study_page(
     ----------
     frame : one row per run
     summary : as `study_summary` returns it
-    pictures, remarks : as `study_pictures` returns them
+    drawn : as `study_pictures` returns it
     """
+    pictures = drawn.pictures
     table = study_table(frame)
     measure, _ = main_measure(table)
     varied = ", ".join(column.removeprefix("set.") for column in study.varied)
@@ -96,9 +92,9 @@ def study_page(
             pictures=chosen(pictures, "distr"),
             charts=_charts(table, summary, pictures),
         ),
-        _factors(summary, pictures, measure),
+        _factors(table, summary, pictures, measure),
         _all_figures(summary),
-        _worst(frame, table, study, measure, pictures, remarks),
+        _worst(frame, table, study, measure, drawn),
         _failed(frame, table),
         Section(
             "What was run",
@@ -145,7 +141,10 @@ def _charts(
 
 
 def _factors(
-    summary: Mapping[str, Any], pictures: Mapping[str, bytes], measure: Measure
+    table: "DataFrame",
+    summary: Mapping[str, Any],
+    pictures: Mapping[str, bytes],
+    measure: Measure,
 ) -> Section:
     title = f"What the {measure.title} depends on"
     factors = summary["factors"]
@@ -156,7 +155,10 @@ def _factors(
     names = summary["grouped_by"]
     groups = factors[0]["groups"][:MOST_COLUMNS]
     fewest = min((each["n"] for each in groups if each["n"] > 1), default=2)
-    header = ["", *(f"{', '.join(value_text(g[n]) for n in names)} ({g['n']:,})" for g in groups)]
+    header = [
+        "factor",
+        *(f"{', '.join(value_text(g[n]) for n in names)} ({g['n']:,})" for g in groups),
+    ]
     rows = [
         [column_text(factor["column"]) + ("" if factor["numeric"] else " (categories)")]
         + [number(each["correlation"], 2) for each in factor["groups"][:MOST_COLUMNS]]
@@ -175,6 +177,13 @@ def _factors(
         [Table(header, rows)],
         summary["factor_remarks"],
         pictures=chosen(pictures, "factor"),
+        charts={
+            name.replace("_", " "): factor_charts(
+                table, names, measure, name.removeprefix("factor_")
+            )
+            for name in pictures
+            if name.startswith("factor_")
+        },
     )
 
 
@@ -210,22 +219,22 @@ def _worst(
     table: "DataFrame",
     study: Study,
     measure: Measure,
-    pictures: Mapping[str, bytes],
-    remarks: list[str],
+    drawn: Drawn,
 ) -> Section:
     worst = worst_runs(table, measure)
     title = f"The worst runs by {measure.title}"
     if len(worst) == 0:
         return Section(title, [f"No run has a {measure.title}."])
-    drawn = chosen(pictures, "worst")
+    shown_runs = chosen(drawn.pictures, "worst")
     text = f"Of {', '.join(dict.fromkeys(worst['controller']))}; the references are left out."
     return Section(
         title,
-        [text, *([f"Drawn below: up to {DRAWN} of them, the worst first."] if drawn else [])],
+        [text, *([f"Drawn below: up to {DRAWN} of them, the worst first."] if shown_runs else [])],
         [runs_table(worst, study.varied)],
-        remarks,
-        drawn,
+        drawn.remarks,
+        shown_runs,
         commands(frame, worst),
+        charts={name.replace("_", " "): chart for name, chart in drawn.charts.items()},
     )
 
 

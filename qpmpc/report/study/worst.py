@@ -1,6 +1,8 @@
 """The runs of a study that a reader should look at: the worst, and those that failed."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
 from math import isclose
 from typing import TYPE_CHECKING, Any
 
@@ -78,23 +80,40 @@ def commands(frame: "DataFrame", rows: "DataFrame") -> list[tuple[str, str]]:
     ]
 
 
-def draw_worst(
-    frame: "DataFrame", table: "DataFrame", measure: Measure, rerun: Rerun
-) -> tuple[dict[str, bytes], list[str]]:
+@dataclass
+class Drawn:
+    """Pictures of a study.
+
+    Attributes
+    ----------
+    pictures : PNG by name
+    charts : what the page draws itself, by the names of the pictures that it stands for
+    remarks : a line for each that could not be made
+    """
+
+    pictures: dict[str, bytes] = field(default_factory=dict)
+    charts: dict[str, dict[str, Any]] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+
+
+def _style_of(controllers: Sequence[str], _: str, place: int) -> dict[str, Any]:
+    from qpmpc.report.style import line_style
+
+    return line_style(controllers[place], place)
+
+
+def draw_worst(frame: "DataFrame", table: "DataFrame", measure: Measure, rerun: Rerun) -> Drawn:
     """Drive the worst runs again and draw them, with dp on the same trip where the study has it.
 
     Parameters
     ----------
     frame, table : of the study, row by row the same runs
     rerun : drives the run of a row of `frame` again
-
-    Returns
-    -------
-    pictures (PNG) by name, and a line for each that could not be made
     """
+    from qpmpc.report.charts import run_chart
     from qpmpc.report.trajectories import draw_trajectories
 
-    pictures, remarks = {}, []
+    drawn = Drawn()
     best = table[(table["controller"] == OPTIMUM) & ~table["failed"]]
     for i, (place, row) in enumerate(worst_runs(table, measure).head(DRAWN).iterrows(), start=1):
         there = [] if is_nothing(row["trip_hash"]) else best["trip_hash"] == row["trip_hash"]
@@ -102,8 +121,13 @@ def draw_worst(
         try:
             rows = [frame.iloc[each].to_dict() for each in places]
             runs = [rerun(each) for each in rows]
-            pictures[f"worst_{i}"] = draw_trajectories(runs)
-            remarks += [
+            drawn.pictures[f"worst_{i}"] = draw_trajectories(runs)
+            drawn.charts[f"worst_{i}"] = run_chart(
+                runs,
+                [f"{short(r['controller'], LONGEST)} (run {r['run']})" for r in rows],
+                partial(_style_of, [run.controller for run in runs]),
+            )
+            drawn.remarks += [
                 f"run {each['run']} burns {run.fuel_g:.4g} g when it is driven again, not "
                 f"{each['fuel_g']:.4g} g: a file that it needs, or the code, has changed"
                 for each, run in zip(rows, runs, strict=True)
@@ -112,5 +136,5 @@ def draw_worst(
         # whatever a user's own controller raises: the report has the rest
         except Exception as error:
             reason = short(f"{type(error).__name__}: {error}", LONGEST)
-            remarks.append(f"run {row['run']} could not be driven again and drawn: {reason}")
-    return pictures, remarks
+            drawn.remarks.append(f"run {row['run']} could not be driven again and drawn: {reason}")
+    return drawn

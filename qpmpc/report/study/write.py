@@ -43,8 +43,8 @@ def write_study(
     def draw() -> tuple[str, dict[str, bytes], list[str]]:
         from qpmpc.report.study.report import study_page, study_pictures
 
-        pictures, remarks = study_pictures(frame, summary, rerun)
-        return study_page(frame, study, summary, pictures, remarks), pictures, remarks
+        drawn = study_pictures(frame, summary, rerun)
+        return study_page(frame, study, summary, drawn), drawn.pictures, drawn.remarks
 
     return _write_page(folder, "report", "summary", draw)
 

@@ -46,9 +46,14 @@ const make = (tag, text, className) => {
     table.classList.add("sorted");
   };
 
-  const quoted = (cell) => /[",\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell;
+  // as qpmpc/report/csv_text.py: a spreadsheet computes what begins so, but for a figure, which may
+  // be followed by its unit, a range or words; they hold nothing that computes
+  const formula = /^\s*[=+\-@\uFF1D\uFF0B\uFF0D\uFF20]/;
+  const figures = /^[+-]?[\d.][\d,]*(?:[\w\s.,%[\]\u00B0]|-(?=[\d.]))*\*?$|^-$/;
+  const inert = (cell) => (formula.test(cell) && !figures.test(cell) ? `'${cell}` : cell);
+  const quoted = (cell) => /[",;\t\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell;
   const download = (table) => {
-    const lines = [...table.rows].map((row) => [...row.cells].map((cell) => quoted(text(cell))).join(","));
+    const lines = [...table.rows].map((row) => [...row.cells].map((cell) => quoted(inert(text(cell)))).join(","));
     const link = make("a");
     link.href = URL.createObjectURL(new Blob([lines.join("\n") + "\n"], { type: "text/csv" }));
     link.download = `${table.dataset.file || "table"}.csv`;
