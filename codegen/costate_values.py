@@ -114,7 +114,9 @@ def costate_values_of(
         departure_linearisations=mh_costate.DEPARTURE_LINEARISATIONS,
         warm_up_steps=1,
         constants=CONSTANTS
-        | of_modules((dual, "LEAST_SWITCH_G" + (" START_QUARTER_STEPS" if table.has_start else ""))),
+        | of_modules(
+            (dual, "LEAST_SWITCH_G" + (" START_QUARTER_STEPS" if table.has_start else ""))
+        ),
         costate={
             "SHARED_PIECES": len(envelope.slope),
             "SHARED_STRIDE": stride,
