@@ -53,7 +53,9 @@ def test_it_is_concave(car, step, soc, t_cl, on, seed):
     p, _ = program(car, step, soc, t_cl, on)
     one, other = multipliers(p, seed), multipliers(p, seed + 1)
     ends = dual(p, one).value, dual(p, other).value
-    middle = dual(p, one.towards(other, 0.5)).value
+    # not `towards`, which stops where a multiplier changes its sign
+    half = Multipliers(0.5 * (one.charge + other.charge), 0.5 * (one.heat + other.heat))
+    middle = dual(p, half).value
     assert middle >= 0.5 * sum(ends) - 1e-6 * (1.0 + max(map(abs, ends)))
 
 
@@ -79,6 +81,15 @@ def test_newton_finds_its_top(car, step, soc, t_cl, on):
     few = top(60.0, 60), top(300.0, 60)
     if few[0] != pytest.approx(few[1], abs=0.02):
         assert top(60.0, 1000) == pytest.approx(top(300.0, 1000), abs=0.02)
+
+
+def test_a_multiplier_of_the_coolant_ends_at_zero_on_its_way_to_the_other_limit():
+    one = Multipliers(np.zeros(4), np.array([1.0, -1.0, 0.0, 1.0]))
+    other = Multipliers(np.ones(4), np.array([-2.0, 2.0, -2.0, 0.0]))
+    half, beyond = one.towards(other, 0.5), one.towards(other, 2.0)
+    assert half.heat == pytest.approx([0.0, 0.0, -1.0, 0.5])
+    assert beyond.heat == pytest.approx([0.0, 0.0, -4.0, 0.0])
+    assert half.charge == pytest.approx(np.full(4, 0.5))
 
 
 @settings(deadline=None, max_examples=200)

@@ -71,6 +71,20 @@ def test_a_price_falls_over_a_lower_limit_and_rises_over_an_upper_one():
     assert price == pytest.approx([1.0, 1.0, -1.0, 0.0])
 
 
+def test_terms_that_a_walk_cut_short_does_not_reach_have_the_prices_given():
+    """After the last stretch that has ended, whose own price does not depend on them."""
+    low, high = np.full(4, -10.0), np.full(4, 10.0)
+    low[0] = high[0] = 1.0
+    low[1] = high[1] = 3.0
+    decay, beyond = np.array([1.0, 0.5, 0.5, 0.5]), np.array([9.0, 8.0, 7.0, 6.0])
+    whole, cut = (
+        funnel(np.zeros(4), np.ones(4), low, high, decay, steps=steps, beyond=beyond)
+        for steps in (100, 2)
+    )
+    assert whole == pytest.approx([1.0, 2.5, 0.0, 0.0])
+    assert cut == pytest.approx([1.0, 2.5, 7.0, 6.0])
+
+
 def test_a_limit_that_no_price_can_move_is_passed_over():
     low = np.array([1.0, 1.0])
     price = funnel(np.zeros(2), np.array([0.0, 1.0]), low, low + 1.0, steps=6)
