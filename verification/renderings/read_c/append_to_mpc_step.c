@@ -7,7 +7,7 @@ mpc_real reader_prepare(mpc_state *state, const mpc_in *in, const mpc_real *x)
 {
     mpc_init(state);
     int32_t elapsed = 0;
-    (void)mpc_check_measured(&state->watch, in, &elapsed);
+    (void)mpc_check_measured(&state->watch, &state->cal, in, &elapsed);
     mpc_stages_take(state, in);
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         for (int32_t i = 0; i < MPC_VARS; i++) {
