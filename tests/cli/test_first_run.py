@@ -78,7 +78,7 @@ def completed(words: str) -> list[str]:
 
 
 def test_the_shell_completes_commands_and_names():
-    assert completed("qpmpc sim") == ["simulate"]
+    assert completed("qpmpc simula") == ["simulate"]
     assert completed("qpmpc compare nycc --controllers ecms,rule") == ["ecms,rule-based"]
 
 

@@ -120,8 +120,8 @@ def test_other_settings(vehicle_changes: dict[str, object], changes: dict[str, o
         ("mpc_rows_admm.h", "b->t_cl_max_high", "REAL(1.0e30)", "matrices"),
         (
             "mpc_rows_values.h",
-            "q[MPC_VAR_T_SLACK] += mpc_par",
-            "q[MPC_VAR_T_SLACK] -= mpc_par",
+            "q[MPC_VAR_T_SLACK] += cal->",
+            "q[MPC_VAR_T_SLACK] -= cal->",
             "matrices",
         ),
         # the solver's own work: the matrix is right, what is found with it is not

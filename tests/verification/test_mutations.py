@@ -179,7 +179,7 @@ MUTATIONS = [
     Mutation(
         "wrong terminal band", qpmpc.qp.stage_qp, "qp_parameters",
         "max(settings.terminal_low", "max(0.98 * settings.terminal_low", (*QP, *NLP),
-        ("Optimum of the QP", "Planned fuel"),
+        ("Optimum of the QP", "SOC at arrival"),
     ),
     Mutation(
         "UA of a stage in km/h", rows, "QUANTITIES",

@@ -13,6 +13,7 @@ EVERY = 15  # steps from one state compared to the next
 SAME_ON_OFF_PERCENT = 90.0
 FIRST_POWER_W = 1000.0  # of some 10 kW while the engine runs
 SOC = 0.05  # of the 0.4 that the battery may use
+SOC_END = 0.002  # what the residuals of a fixed number of iterations leave
 T_CL_K = 3.0  # of the 50 between the coolant's limits
 PLANNED_FUEL_PERCENT = 0.3
 
@@ -62,6 +63,14 @@ def plans_beside_the_nonlinear_program(context: Context) -> Iterator[Check]:
                 "soc",
                 "p95",
                 SOC,
+                "",
+            ),
+            (
+                "SOC at arrival",
+                "In 95 % of states both plan to arrive with the same SOC.",
+                "soc_end",
+                "p95",
+                SOC_END,
                 "",
             ),
             (

@@ -36,6 +36,7 @@ class PlanPair:
     qp_on_share, nlp_on_share : sigma of the first second
     qp_power_w, nlp_power_w : engine power of the first second, mean over it (E)
     soc_difference : largest difference of the predicted SOC, over all stages
+    soc_end_difference : of the predicted SOC at arrival
     t_cl_difference_k : the same of the coolant, up to the last stage in which fuel is planned;
         after it heat has no use, and the QP leaves it undetermined
     qp_fuel_g, nlp_fuel_g : fuel to arrival of both plans, driven on the exact maps, with that of
@@ -48,6 +49,7 @@ class PlanPair:
     qp_power_w: float
     nlp_power_w: float
     soc_difference: float
+    soc_end_difference: float
     t_cl_difference_k: float
     qp_fuel_g: float
     nlp_fuel_g: float
@@ -73,6 +75,7 @@ class OpenLoopComparison:
                 np.mean([(p.qp_on_share < 0.5) == (p.nlp_on_share < 0.5) for p in pairs])
             ),
             "first_power_w": _spread(np.array([p.qp_power_w - p.nlp_power_w for p in pairs])),
+            "soc_end": _spread(np.array([pair.soc_end_difference for pair in pairs])),
             "soc": _spread(np.array([pair.soc_difference for pair in pairs])),
             "t_cl_k": _spread(np.array([pair.t_cl_difference_k for pair in pairs])),
             "planned_fuel_percent": _spread(100.0 * fuel / trip_fuel_g),
@@ -130,6 +133,7 @@ def _pair(driver: PlanDriver, seen: Observation, qp: QpPlan, nlp: NlpPlan) -> Pl
         qp_power_w=float(qp.x[0, Var.P_ENG]),
         nlp_power_w=float(sigma[0] * power[0]),
         soc_difference=float(soc[counts].max()),
+        soc_end_difference=float(soc[counts][-1]),
         t_cl_difference_k=float(t_cl[warmed].max()),
         qp_fuel_g=qp_end.fuel_g - nlp.soc_costate_g * soc_end,
         nlp_fuel_g=nlp_end.fuel_g,
