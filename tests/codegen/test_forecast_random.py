@@ -46,7 +46,7 @@ int main(void)
     mpc_out out;
     in.soc = (mpc_real)0.6;
     in.t_cl_degc = (mpc_real)50;
-    for (int32_t trip = 0; trip < 300; trip++) {
+    for (int32_t trip = 0; trip < 200; trip++) {
         const mpc_road said = road(below(4) ? below(90) : below(2));
         const int32_t refused = mpc_forecast_start(&forecast, &said);
         if (refused != ((said.steps == 0) ? -1 : 0)) {

@@ -240,10 +240,10 @@ def test_its_soc_limits_are_those_of_the_qp() -> None:
 
 def test_comparison() -> None:
     cycle = beginning("nycc", 200)
-    comparison = compare([Trip(cycle, VEHICLE)], every=10)
+    comparison = compare([Trip(cycle, VEHICLE)], every=20)
     result = json.loads(json.dumps(comparison.to_dict()))
     (open_loop,), (closed_loop,) = result["open_loop"], result["closed_loop"]
-    assert open_loop["states"] == 20
+    assert open_loop["states"] == 10
     assert open_loop["nlp_unsolved"] == 0
     assert open_loop["same_on_off_share"] > 0.9
     # what the PWA curves, the linearised alpha and a limited number of iterations cost together
