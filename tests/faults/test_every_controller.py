@@ -46,7 +46,7 @@ def trip(cycle: Cycle) -> Trip:
 def test_preview_solver_and_measurement(cycle, trip, controller, settings):
     if controller == "mh-nlp":
         pytest.importorskip("casadi")
-        # IPOPT is three times as fast where starts are free, and slow enough to stop after the faults
+        # IPOPT is three times as fast where starts are free, and slow: no more than the faults
         seconds = AT_S + 21
         short = Cycle.from_samples("short", np.arange(float(seconds)), cycle.speed_mps[:seconds])
         trip = Trip(short, "paper-nimh")
