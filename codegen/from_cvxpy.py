@@ -30,7 +30,7 @@ from qpmpc.codegen.kept_library import kept_library
 from qpmpc.controllers.cvxpy_planner import CvxpyPlanner
 from qpmpc.controllers.settings import SettingsLike
 from qpmpc.errors import InputError
-from qpmpc.files import write_text
+from qpmpc.files import write_texts
 from qpmpc.qp.cvxpy_twin import UNIT
 from qpmpc.trip import Trip
 
@@ -141,9 +141,7 @@ def write_c(planner: CvxpyPlanner, folder: str | Path) -> Path:
     InputError, CodegenError
         As of `program_files`; or if a file cannot be written.
     """
-    files = program_files(planner)
-    for name, text in files.items():
-        write_text(Path(folder) / name, text)
+    write_texts(Path(folder), program_files(planner))
     return Path(folder)
 
 

@@ -20,7 +20,7 @@ from qpmpc.codegen.rows.solver_c import rows_files
 from qpmpc.codegen.rows.stage_c import places_of
 from qpmpc.codegen.values import Values
 from qpmpc.errors import InputError
-from qpmpc.files import check_folder, write_text
+from qpmpc.files import check_folder, write_texts
 from qpmpc.names import unknown
 
 Precision = Literal["f32", "f64"]
@@ -87,10 +87,7 @@ def generate(
         folder cannot be written to.
     """
     check_folder(folder, "output folder")
-    files = project_files(values, target, precision, algorithm, prefix)
-    for name, text in files.items():
-        write_text(folder / name, text)
-    return [folder / name for name in files]
+    return write_texts(folder, project_files(values, target, precision, algorithm, prefix))
 
 
 def project_files(

@@ -101,6 +101,13 @@ def write_text(file: Path, content: str) -> None:
     write_bytes(file, content.encode())
 
 
+def write_texts(folder: Path, files: dict[str, str]) -> list[Path]:
+    """Write texts by their names into a folder; returns the files. See `write_bytes`."""
+    for name, text in files.items():
+        write_text(folder / name, text)
+    return [folder / name for name in files]
+
+
 def replace_file(
     file: Path, content: bytes, mode: int | None = None, durable: bool = False
 ) -> None:

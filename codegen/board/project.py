@@ -34,7 +34,7 @@ from qpmpc.codegen.method import Generated, Method
 from qpmpc.controllers.base import Progress
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.errors import InputError
-from qpmpc.files import check_folder, write_text
+from qpmpc.files import check_folder, write_texts
 from qpmpc.shown import shown
 from qpmpc.trip import Observation, Trip
 
@@ -149,9 +149,7 @@ def write_project(
             kept.remove(LINKER_SCRIPT)
         elif remark := on_edited_script(earlier, algorithm, precision):
             remarks.append(remark)
-    for name, text in files.items():
-        if name not in kept:
-            write_text(folder / name, text)
+    write_texts(folder, {name: text for name, text in files.items() if name not in kept})
     if earlier is not None:
         remarks += remove_leftovers(folder, earlier, files)
     return Project(manifest, kept, remarks)

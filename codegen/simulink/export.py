@@ -9,7 +9,7 @@ from qpmpc.codegen.parts.part import Part
 from qpmpc.codegen.parts.variables import Kind, Role, Variable
 from qpmpc.codegen.prefix import FORM, with_prefix
 from qpmpc.errors import InputError
-from qpmpc.files import check_folder, write_text
+from qpmpc.files import check_folder, write_texts
 
 BODY = "s_function.c"
 
@@ -50,11 +50,7 @@ def export_s_function(part: Part, folder: Path) -> list[Path]:
     InputError
         If the folder's name cannot be used or nothing can be written into it.
     """
-    name = checked_name(folder)
-    files = s_function_files(part, name)
-    for file, text in files.items():
-        write_text(folder / file, text)
-    return [folder / file for file in files]
+    return write_texts(folder, s_function_files(part, checked_name(folder)))
 
 
 def s_function_files(part: Part, name: str) -> dict[str, str]:

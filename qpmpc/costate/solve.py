@@ -13,7 +13,8 @@ from qpmpc.costate.program import Program
 
 Floats = NDArray[np.float64]
 
-CHARGE_QUARTER_STEPS, HEAT_QUARTER_STEPS = 11, 5  # of the funnels, a quarter of a term
+# Steps of the funnels, a quarter of those a term has.
+CHARGE_QUARTER_STEPS, HEAT_QUARTER_STEPS = 11, 5
 LEAST_RISE_G = 1e-7  # of the dual: less is as good as none
 BACKGROUND = 0.05  # share of a switch's curvature that a stage has that does not respond now
 MODERATE = 0.15  # of the engine's power

@@ -261,7 +261,7 @@ def test_driving_a_plan_of_the_nonlinear_program_repeats_it() -> None:
     plan = nlp.solve(start)
     power = [plan.power_on_w(k) for k in range(len(plan.z))]
     sigma = plan.x[:, NlpVar.ON]
-    driver = PlanDriver(nlp.solver.problem, nlp.short_stages)
+    driver = PlanDriver(nlp.solver.problem)
     driven = driver.drive(plan.stages, start, sigma, sigma * power)
     last = np.flatnonzero(plan.stages.duration_s > 0.0)[-1]
     assert driven.soc_end == pytest.approx(plan.x[last, NlpVar.SOC], abs=1e-5)

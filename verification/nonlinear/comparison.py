@@ -151,7 +151,7 @@ def compare_open_loop(
         If CasADi is not installed.
     """
     driver, nlp = MhQp(trip, settings), MhNlp(trip, settings)
-    plans = PlanDriver(nlp.solver.problem, nlp.short_stages)
+    plans = PlanDriver(nlp.solver.problem)
     nlp.depart(trip.start)
     pairs: list[PlanPair] = []
     unsolved = 0

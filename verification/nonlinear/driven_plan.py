@@ -47,11 +47,10 @@ class PlanDriver:
     Parameters
     ----------
     problem : whose stages are driven
-    short_stages : how many of them, at the front, are of one second
     """
 
-    def __init__(self, problem: NlpProblem, short_stages: int) -> None:
-        self._problem, self._short = problem, short_stages
+    def __init__(self, problem: NlpProblem) -> None:
+        self._problem = problem
         self._second, self._block = problem.stage(1), problem.stage(THERMOSTAT_STEPS)
 
     def drive(
@@ -80,7 +79,7 @@ class PlanDriver:
             if problem.count > NlpVar.START:
                 x[NlpVar.START] = starts
             stage_g = self._stage(
-                self._second if k < self._short else self._block, state, x, road[k]
+                self._second if k < problem.short_stages else self._block, state, x, road[k]
             )
             fuel_g += stage_g + problem.vehicle.engine.start_fuel_g * starts
             state, before = x[[NlpVar.SOC, NlpVar.T_CL]], sigma

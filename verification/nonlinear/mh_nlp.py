@@ -20,10 +20,6 @@ class MhNlp(Planner):
     ----------
     trip, settings : as of `Planner`; of `mh_qp` its horizon, terminal band and margins apply
 
-    Attributes
-    ----------
-    short_stages : stages of one second, at the front of the horizon
-
     Raises
     ------
     QpmpcError
@@ -37,8 +33,8 @@ class MhNlp(Planner):
         super().__init__(trip, settings)
         of_qp = self.settings.mh_qp
         self.preview = trip.preview(of_qp.horizon)
-        self.short_stages = of_qp.horizon.short_stages
-        problem = NlpProblem(trip.vehicle, self.preview.count, self.short_stages, of_qp.qp)
+        self._short = of_qp.horizon.short_stages
+        problem = NlpProblem(trip.vehicle, self.preview.count, self._short, of_qp.qp)
         self.solver = NlpSolver(problem)
         self._shift = self.preview.shift()
         self._ramp = RampFloor(trip.vehicle)
@@ -55,12 +51,12 @@ class MhNlp(Planner):
         solved = self.solve(seen)
         if not solved.solved:
             return Plan.none("IPOPT does not converge", solved.iterations)
-        on_share = solved.z[: self.short_stages, NlpVar.ON]
+        on_share = solved.z[: self._short, NlpVar.ON]
         powers_w = np.zeros_like(on_share)
         for stage in np.flatnonzero(on_share >= ON_THRESHOLD).tolist():
             powers_w[stage] = solved.power_on_w(stage)
-        arrival_s = solved.stages.arrival_s(self.short_stages)
-        least_w = self._ramp.least_w(solved.stages.seconds_w(self.short_stages), seen.soc)
+        arrival_s = solved.stages.arrival_s(self._short)
+        least_w = self._ramp.least_w(solved.stages.seconds_w(self._short), seen.soc)
         return Plan(
             on_share,
             powers_w,
@@ -68,7 +64,7 @@ class MhNlp(Planner):
             solved.iterations,
             arrival_s=arrival_s,
             least_w=least_w,
-            fast_s=solved.stages.fast_s(self.short_stages, self.trip.vehicle),
+            fast_s=solved.stages.fast_s(self._short, self.trip.vehicle),
         )
 
     def forget(self) -> None:

@@ -95,19 +95,22 @@ class NlpProblem:
     Attributes
     ----------
     count : variables of a stage
+    short_stages : as given
     """
 
     def __init__(
         self, vehicle: Vehicle, stages: int, short_stages: int, settings: QpSettings
     ) -> None:
         self.vehicle, self.stages, self.settings = vehicle, stages, settings
+        self.short_stages = short_stages
         self._maps = SmoothMaps(vehicle)
         self._has_start = table_of(vehicle.engine).has_start
         self.count = len(NlpVar) if self._has_start else len(NlpVar) - 1
-        self._build(short_stages)
+        self._build()
 
-    def _build(self, short_stages: int) -> None:
+    def _build(self) -> None:
         ca, n, trip = casadi(), self.stages, self.vehicle.trip
+        short_stages = self.short_stages
         z = ca.MX.sym("z", self.count, n)
         missing = ca.MX.sym("missing")  # of SOC, in solver units
         road = ca.MX.sym("road", ROAD, n)

@@ -29,16 +29,7 @@ def bars_chart(study: Study, labels: Sequence[str]) -> dict[str, Any]:
     for cycle in (each.name for each in study.extent.cycles):
         rows = [study.rows[cycle, label] for label in labels]
         fuel = [row["fuel_soc_balanced_g"] for row in rows]
-        own = [
-            Series(
-                label,
-                only(fuel, [label == each for each in labels]),
-                color(label),
-                label,
-                bars=True,
-            )
-            for label in labels
-        ]
+        own = _one_each(fuel, labels, bars=True)
         said = [_fuel_text(study, cycle, label) for label in labels]
         short = [
             f"{row['fuel_soc_balanced_g']:.1f} g"
@@ -56,6 +47,14 @@ def bars_chart(study: Study, labels: Sequence[str]) -> dict[str, Any]:
         )
         panels.append(_times(cycle, labels, [row["step_time_ms"]["mean"] for row in rows]))
     return in_rows(labels, panels, groups_of(panels))
+
+
+def _one_each(values: Sequence[float], labels: Sequence[str], **look: Any) -> list[Series]:
+    """Return a series of one value for each variant, in its colour."""
+    return [
+        Series(label, only(values, [label == each for each in labels]), color(label), label, **look)
+        for label in labels
+    ]
 
 
 def _fuel_text(study: Study, cycle: str, label: str) -> str:
@@ -80,16 +79,7 @@ def _times(cycle: str, labels: Sequence[str], mean_ms: Sequence[float | None]) -
     return Panel(
         f"{cycle}: mean time per step, ms (hollow: the paper's)",
         [
-            *(
-                Series(
-                    label,
-                    only(ours, [label == each for each in labels]),
-                    color(label),
-                    label,
-                    points=True,
-                )
-                for label in labels
-            ),
+            *_one_each(ours, labels, points=True),
             Series("the paper's", numbers(theirs), GREY, "the paper's", points=True, hollow=True),
         ],
         log=True,
