@@ -115,7 +115,7 @@ def costate_values_of(
         warm_up_steps=1,
         constants=CONSTANTS
         | of_modules(
-            (dual, "LEAST_SWITCH_G" + (" START_QUARTER_STEPS" if table.has_start else ""))
+            (dual, "LEAST_SWITCH_G NEAR_K" + (" START_QUARTER_STEPS" if table.has_start else ""))
         ),
         costate={
             "SHARED_PIECES": len(envelope.slope),

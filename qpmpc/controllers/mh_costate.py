@@ -191,6 +191,7 @@ class MhCostate(Planner):
         rounds: int,
     ) -> CostatePlan:
         program = self.programs.at(stages, seen.soc, seen.t_cl_degc, about, seen.engine_on)
+        start = start.near(program, about.t_cl_end_degc)
         found = newton(program, start, rounds, self._most_charge_g)
         layout = Layout.of(stages, self._horizon, self._shortest, seen.engine_for_s)
         exact = StageCosts.of(program, found.at, program.curves)

@@ -20,6 +20,8 @@ START_SWITCH_G_PER_S, START_LONG_SWITCH_G_PER_S = 0.01, 0.015
 LEAST_SWITCH_G = 1e-4  # of a masked stage
 START_QUARTER_STEPS = 12  # of the funnel, a quarter of those a stage has
 
+NEAR_K = 1.0  # of a coolant limit: a plan that is further from it has left it
+
 
 @dataclass(frozen=True)
 class Multipliers:
@@ -46,6 +48,22 @@ class Multipliers:
             self.charge + share * (other.charge - self.charge),
             np.where(self.heat * heat < 0.0, 0.0, heat),
         )
+
+    def near(self, program: Program, t_cl_degc: Floats) -> "Multipliers":
+        """Return these without the multipliers of coolant limits that a plan has left.
+
+        A limit that has a multiplier is aimed at from either side (`solve`). Of one that the road
+        has left meanwhile that aim is wrong, and all others with it: no round may rise any more.
+
+        Parameters
+        ----------
+        program : of the second
+        t_cl_degc : coolant temperature at the end of each stage, as planned last, shape (n,)
+        """
+        above = t_cl_degc > program.t_low + NEAR_K
+        below = t_cl_degc < program.t_high - NEAR_K
+        has_left = np.where(self.heat > 0.0, above, below)
+        return Multipliers(self.charge, np.where(has_left, 0.0, self.heat))
 
 
 def with_signs(at: Multipliers, slack_g_per_k: float) -> Multipliers:
