@@ -23,7 +23,8 @@ ABSENT = ("", "nan", "null", "n/a")
 SAMPLED = 100  # lines by which the width of a table is judged
 _UNIT_IN_TITLE = (
     re.compile(r"^(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*$"),  # BSFC [g/(kWh)]
-    re.compile(r"^(?P<name>.*?)\s*\((?P<unit>[^()]*)\)\s*$"),  # Speed (OBD)(km/h)
+    re.compile(r"^(?P<name>.*?)\s*/?\s*\((?P<unit>[^()]*)\)\s*$"),  # Speed (OBD)(km/h), v / (km/h)
+    re.compile(r"^(?P<name>.*\S)\s+(?:in|/)\s+(?P<unit>\S+)$"),  # v in km/h, v / km/h: DIN 1313
     re.compile(r"^(?P<name>[^,]*),\s*(?P<unit>[^,]*)$"),  # Target Speed, mph
 )
 
@@ -37,8 +38,8 @@ class Column:
     title : as written in the header
     name : the title without its unit, in lower case, without accents, `_` for all but letters and
         digits
-    unit : in brackets or after a comma in the title, or from a row of units, in lower case without
-        spaces; empty where neither is
+    unit : in brackets or after a comma, `in` or a slash in the title, or from a row of units, in
+        lower case without spaces; empty where neither is
     cells : of each row, without spaces around
     """
 
@@ -209,7 +210,7 @@ def _of_width(path: Path, number: int, cells: list[str], width: int) -> list[str
 
 
 def split_title(title: str) -> tuple[str, str]:
-    """Return `Column.name` and the unit in brackets or after a comma, empty where there is none."""
+    """Return `Column.name` and the unit in the title, empty where there is none."""
     found = next((match for form in _UNIT_IN_TITLE if (match := form.match(title))), None)
     name, unit = (found["name"], found["unit"]) if found else (title, "")
     bare = re.sub("[\u0300-\u036f]", "", normalize("NFD", name.casefold()))

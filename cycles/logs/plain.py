@@ -82,7 +82,8 @@ def _columns(path: Path, header: list[str]) -> list[str]:
         found = found[:77] + "..."
     raise InputError(
         f"{path}, line 1: columns found: {found!r}; a time and a speed with units are needed, "
-        f"as in 'Time [s],Speed [km/h]'; allowed: {ALLOWED_TEXT}"
+        "as in 'Time [s],Speed [km/h]', or a speed of any name by qpmpc convert --speed-column; "
+        f"allowed: {ALLOWED_TEXT}"
     )
 
 

@@ -178,6 +178,7 @@ def _of_day(cell: str) -> float | None:
 
 def _date(cell: str) -> float | None:
     """Seconds of a date; one without a zone counts from an arbitrary one."""
+    cell = cell.replace(",", ".")  # of the seconds
     try:
         found = datetime.fromisoformat(cell)
     except ValueError:

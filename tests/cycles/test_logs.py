@@ -56,6 +56,13 @@ FILES = {
     + rows(lambda k, v: f"{k},0;{v * 3.6!r};212,5".replace(".", ",")),
     "a German app": "Device Time,Geschwindigkeit (OBD)(km/h),GPS Höhe(m)\n"
     + rows(lambda k, v: f"{BEGIN + timedelta(seconds=k):%d-%b-%Y %H:%M:%S}.120,{v * 3.6!r},212"),
+    "German, units as DIN 1313 writes them": "Zeit in s;v / (km/h);Höhe / m\n"
+    + rows(lambda k, v: f"{k},0;{v * 3.6!r};212,5".replace(".", ",")),
+    "German, decimal commas in dates": "Zeitstempel;Geschwindigkeit in km/h\n"
+    + rows(
+        lambda k, v: f"{BEGIN + timedelta(seconds=k):%d.%m.%Y %H:%M:%S},000;"
+        + repr(v * 3.6).replace(".", ",")
+    ),
     "German, a row of units": "Zeitstempel;Geschwindigkeit;Steigung\nms;m/s;%\n"
     + rows(lambda k, v: f"{1000 * k};{v!r};0".replace(".", ",")),
     "French": "Temps écoulé (s);Vitesse du véhicule (km/h);Pente (%);Altitude (m)\n"
