@@ -122,15 +122,15 @@ def _add_units(root: Element, variables: list[Variable]) -> None:
 
 def _add_variable(root: Element, fmi: Fmi, reference: int, variable: Variable) -> None:
     kind, role = variable.kind, variable.role
-    variability = "fixed" if role == "parameter" else "discrete"
+    variability = {"parameter": "fixed", "tunable": "tunable"}.get(role, "discrete")
     about = {
         "name": variable.name,
         "valueReference": str(reference),
         "description": variable.description,
-        "causality": role,
+        "causality": "parameter" if role == "tunable" else role,
         "variability": "continuous" if variable.continuous else variability,
     }
-    if role in ("parameter", "output"):
+    if role in ("parameter", "tunable", "output"):
         about["initial"] = "exact" if variable.at_start is None else "calculated"
     typed: dict[str, str] = {}
     if variable.unit is not None:

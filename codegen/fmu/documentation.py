@@ -5,6 +5,7 @@ from html import escape
 from qpmpc.codegen.fmu.description import TOOL, About
 from qpmpc.codegen.parts.variables import Variable
 
+ROLES = {"tunable": "parameter, tunable"}
 PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{name}</title></head><body>
 <h1>{name}</h1>
@@ -24,7 +25,11 @@ def documentation(about: About, variables: list[Variable]) -> str:
     """Return documentation/index.html."""
     rows = [
         (
-            *(variable.name, variable.role, variable.unit or variable.kind),
+            *(
+                variable.name,
+                ROLES.get(variable.role, variable.role),
+                variable.unit or variable.kind,
+            ),
             *("" if limit is None else f"{limit:.6g}" for limit in (variable.low, variable.high)),
             variable.description,
         )

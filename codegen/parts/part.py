@@ -25,6 +25,7 @@ from qpmpc.vehicle.plant import BOILING_DEGC, POWER_TOLERANCE_W
 OF_CONTROLLER = ("mpc_part_controller.h", "mpc_part_controller.c")
 OF_PLANT = ("mpc_part_plant.h", "mpc_part_plant.c", "mpc_plant.h", "mpc_plant.c")
 OF_INSTANCE = ("mpc_instance.h", "mpc_instance.c")  # of either
+CALIBRATED = "mpc_part_calibration.h"
 PART = "mpc_part.h"  # what mpc_instance.h calls the header of the part
 
 
@@ -83,7 +84,9 @@ def controller_part(
     sources |= _programs(OF_CONTROLLER)
     sources["mpc_trip.h"] = _road(trip.forecast, "mpc_real", precision)
     certificate = values.costate is not None
-    variables = controller_variables(trip.vehicle, values.learning, certificate)
+    calibration = values.calibration
+    variables = controller_variables(trip.vehicle, calibration, values.learning, certificate)
+    sources[CALIBRATED] = template_text(f"{CALIBRATED}.j2", names=calibration.names)
     return Part(
         f"Controller {controller} of {values.vehicle}, {precision}",
         f", which knows the trip {shown(trip.cycle.name)}",

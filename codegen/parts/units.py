@@ -25,6 +25,9 @@ UNITS: dict[str, Unit] = {
     "s": Unit({"s": 1}),
     "m/s": Unit({"m": 1, "s": -1}, displays={"km/h": 3.6}),
     "W": Unit({"kg": 1, "m": 2, "s": -3}, displays={"kW": 1e-3}),
+    "W/s": Unit({"kg": 1, "m": 2, "s": -4}, displays={"kW/s": 1e-3}),
     "g": Unit({"kg": 1}, factor=1e-3),
+    "g/s": Unit({"kg": 1, "s": -1}, factor=1e-3),
+    "g/K": Unit({"kg": 1, "K": -1}, factor=1e-3),
     "degC": Unit({"K": 1}, offset=273.15),
 }

@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from qpmpc.codegen.calibration import Calibration, Entry
 from qpmpc.vehicle.capability import Capability
 from qpmpc.vehicle.engine import optimal_line
 from qpmpc.vehicle.parameters import Vehicle
 
 Kind = Literal["real", "integer", "boolean"]
-Role = Literal["independent", "parameter", "input", "output"]
+Role = Literal["independent", "parameter", "tunable", "input", "output"]
 
 LAST_FLAG = 64  # of mpc_out.flags
 LAST_RUNG = 2
@@ -21,7 +22,7 @@ class Variable:
     Attributes
     ----------
     name : in Python, C and the tool that simulates
-    role : what FMI calls causality
+    role : what FMI calls causality; `tunable` is a parameter that may change under way
     description : in one line
     kind : of its values
     unit : one of `qpmpc.codegen.parts.units.UNITS`; none for integers and booleans
@@ -50,12 +51,15 @@ class Variable:
 TIME = Variable("time", "independent", "Time", unit="s", continuous=True)
 
 
-def controller_variables(vehicle: Vehicle, learning: bool, certificate: bool) -> list[Variable]:
+def controller_variables(
+    vehicle: Vehicle, calibration: Calibration, learning: bool, certificate: bool
+) -> list[Variable]:
     """Return the variables of a controller.
 
     Parameters
     ----------
     vehicle : that it is made for
+    calibration : its numbers that are tuned
     learning : whether it reads the fuel injected
     certificate : whether its plan comes with a proof of how good it is
     """
@@ -119,7 +123,22 @@ def controller_variables(vehicle: Vehicle, learning: bool, certificate: bool) ->
             high=2 * LAST_FLAG - 1,
             follows=True,
         ),
+        *map(_tunable, calibration.entries),
     ]
+
+
+def _tunable(entry: Entry) -> Variable:
+    unit = "1" if entry.unit == "SOC" else entry.unit
+    return Variable(
+        entry.name,
+        "tunable",
+        f"Calibration: {entry.what}",
+        unit=unit,
+        start=entry.default,
+        low=entry.least,
+        high=entry.most,
+        display={"SOC": "%", "W": "kW", "W/s": "kW/s"}.get(entry.unit),
+    )
 
 
 def plant_variables(vehicle: Vehicle, with_trip: bool) -> list[Variable]:

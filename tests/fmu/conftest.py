@@ -1,5 +1,6 @@
-"""FMUs of controller and plant, exported once for the tests of a file."""
+"""FMUs of controller and plant, exported once for all tests, in whichever process they run."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -27,13 +28,14 @@ class Exported(dict[str, Path]):
 
     def __missing__(self, name: str) -> Path:
         part, fmi = name[:-1], name[-1]
-        made = (
-            controller_part(self.trip, CONTROLLERS[fmi])
-            if part == "controller"
-            else plant_part(self.trip.vehicle, self.trip)
-        )
         self[name] = self.folder / f"{name}.fmu"
-        export_fmu(made, self[name], fmi)
+        if not self[name].exists():  # another process may have made it; it appears as a whole
+            made = (
+                controller_part(self.trip, CONTROLLERS[fmi])
+                if part == "controller"
+                else plant_part(self.trip.vehicle, self.trip)
+            )
+            export_fmu(made, self[name], fmi)
         return self[name]
 
 
@@ -41,4 +43,7 @@ class Exported(dict[str, Path]):
 def fmus(tmp_path_factory: pytest.TempPathFactory, trip: Trip) -> Exported:
     if compiler() is None:
         pytest.skip("no C compiler on this machine")
-    return Exported(tmp_path_factory.mktemp("fmus"), trip)
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "fmus"
+    folder.mkdir(exist_ok=True)
+    return Exported(folder, trip)

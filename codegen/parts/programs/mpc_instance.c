@@ -76,16 +76,23 @@ int32_t mpc_instance_enter(mpc_instance *instance)
     return moved(instance, MPC_INSTANTIATED, MPC_INITIALISING, "initialization");
 }
 
+static int32_t is_in_range(mpc_instance *instance, const mpc_variable *of, double value)
+{
+    const int32_t fine = ((value >= of->low) && (value <= of->high)) ? 1 : 0;
+    if (fine == 0) {
+        (void)snprintf(instance->message, sizeof instance->message,
+                       "%s is %.9g: it must be %.9g to %.9g", of->name, value, of->low, of->high);
+    }
+    return fine;
+}
+
 static int32_t has_parameters(mpc_instance *instance)
 {
     int32_t fine = 1;
     for (int32_t i = 0; i < MPC_VARIABLES; i++) {
         const mpc_variable *const of = &mpc_variables[i];
-        const double value = instance->state.value[i];
-        if ((of->role == MPC_PARAMETER) && !((value >= of->low) && (value <= of->high))) {
-            (void)snprintf(instance->message, sizeof instance->message,
-                           "%s is %.9g: it must be %.9g to %.9g", of->name, value, of->low,
-                           of->high);
+        if ((of->role == MPC_PARAMETER)
+            && (is_in_range(instance, of, instance->state.value[i]) == 0)) {
             fine = 0;
         }
     }
@@ -194,19 +201,21 @@ int32_t mpc_instance_set(mpc_instance *instance, uint32_t reference, int32_t kin
     int32_t status = MPC_ERROR;
     if (is_known(instance, reference, kind) != 0) {
         const mpc_variable *const of = &mpc_variables[reference];
-        const int32_t last = (of->role == MPC_INPUT) ? MPC_STEPPING : MPC_INITIALISING;
-        if ((of->role != MPC_INPUT) && (of->role != MPC_PARAMETER)) {
+        const int32_t last = (of->role == MPC_PARAMETER) ? MPC_INITIALISING : MPC_STEPPING;
+        if ((of->role == MPC_INDEPENDENT) || (of->role == MPC_OUTPUT)) {
             (void)snprintf(instance->message, sizeof instance->message,
                            "%s cannot be set: it is neither an input nor a parameter", of->name);
-        } else if (is_between(instance, MPC_INSTANTIATED, last, of->name) != 0) {
+        } else if (is_between(instance, MPC_INSTANTIATED, last, of->name) == 0) {
+            /* said there */
+        } else if ((of->role == MPC_TUNABLE) && (is_in_range(instance, of, value) == 0)) {
+            status = MPC_DISCARD;
+        } else {
             instance->state.value[reference] = value;
             instance->state.outputs = MPC_ASKED;
             if (of->role == MPC_PARAMETER) {
                 mpc_part_first(&instance->state);
             }
             status = MPC_OK;
-        } else {
-            /* said there */
         }
     }
     return status;

@@ -15,7 +15,7 @@
 #define MPC_MESSAGE 200 /* characters at most */
 
 enum { MPC_REAL = 0, MPC_INTEGER = 1, MPC_BOOLEAN = 2 };
-enum { MPC_INDEPENDENT = 0, MPC_PARAMETER = 1, MPC_INPUT = 2, MPC_OUTPUT = 3 };
+enum { MPC_INDEPENDENT = 0, MPC_PARAMETER = 1, MPC_INPUT = 2, MPC_OUTPUT = 3, MPC_TUNABLE = 4 };
 enum { MPC_OK = 0, MPC_WARNING = 1, MPC_DISCARD = 2, MPC_ERROR = 3 }; /* as in FMI */
 enum { MPC_INSTANTIATED = 0, MPC_INITIALISING = 1, MPC_STEPPING = 2, MPC_TERMINATED = 3 };
 
@@ -23,7 +23,7 @@ typedef struct {
     int32_t kind;
     int32_t role;
     double start;
-    double low; /* limits, of parameters */
+    double low; /* limits, of parameters, tunable or not */
     double high;
     const char *name;
 } mpc_variable;

@@ -3,6 +3,7 @@
 #include <stdio.h>
 
 #include "mpc_instance.h"
+#include "mpc_part_calibration.h"
 #include "mpc_trip.h"
 
 static const mpc_road trip = {trip_demand_w, trip_speed_mps, MPC_TRIP_S};
@@ -31,6 +32,7 @@ int32_t mpc_part_start(mpc_instance_state *state, char *message)
 {
     int32_t status = MPC_OK;
     mpc_init(&state->part.controller);
+    calibrate(state->value, &state->part.controller.calibration);
     if (mpc_forecast_start(&state->part.forecast, &trip) != 0) {
         (void)snprintf(message, MPC_MESSAGE, "%s",
                        "the trip has a demand or a speed that this car cannot do");
@@ -62,6 +64,7 @@ void mpc_part_decide(mpc_instance_state *state)
     mpc_out out;
     fill(state, &in);
     state->part.decided = state->part.controller;
+    calibrate(state->value, &state->part.decided.calibration);
     (void)mpc_step(&state->part.decided, &in, &out);
     state->value[MPC_VALUE_ENGINE_ON_COMMAND] = (double)out.engine_on;
     state->value[MPC_VALUE_P_ENG_COMMAND_W] = (double)out.p_eng_w;
@@ -73,11 +76,20 @@ void mpc_part_decide(mpc_instance_state *state)
 #endif
     state->value[MPC_VALUE_RUNG] = (double)out.rung;
     state->value[MPC_VALUE_FLAGS] = (double)out.flags;
+    state->part.wrong_entry = out.wrong_entry;
 }
 
 int32_t mpc_part_step(mpc_instance_state *state, char *message)
 {
-    (void)message;
+    const int32_t wrong = state->part.wrong_entry;
+    int32_t status = MPC_OK;
+    if (wrong >= 0) { /* each alone is within its bounds */
+        (void)snprintf(message, MPC_MESSAGE,
+                       "the calibration is refused, the last good one is in use: %s is too high for "
+                       "another number",
+                       mpc_variables[MPC_VALUE_OF_CALIBRATION + wrong].name);
+        status = MPC_WARNING;
+    }
     state->part.controller = state->part.decided;
-    return MPC_OK;
+    return status;
 }
