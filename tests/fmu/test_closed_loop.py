@@ -73,17 +73,20 @@ def test_a_command_a_second_late_costs_what_is_documented(fmus, trip, fmi):
     """As of a master that reads all outputs first; to 5 %, for other processors."""
     page = (Path(__file__).parents[2] / "docs" / "fmu.md").read_text("utf-8")
     row = rf"\| `{CONTROLLERS[fmi]}`, NYCC \| ([\d.]+) .*?\| (\d+) \| ([\d.]+) .*?\| (\d+) \|"
-    in_order_g, _, late_g, _ = map(float, re.search(row, page).groups())
+    in_order_g, _, late_g, late_starts = map(float, re.search(row, page).groups())
     with Unit(fmus[f"controller{fmi}"]) as controller, Unit(fmus[f"plant{fmi}"]) as plant:
         Loop(controller, plant)
+        on = [0.0]
         for t in range(trip.steps):
             measured = dict(zip(TO_CONTROLLER, plant.get(*TO_CONTROLLER), strict=True))
             connect(controller, plant, TO_PLANT)
             controller.set(**measured)
             controller.step(t)
             plant.step(t)
+            on += plant.get("engine_on")
         (found_g,) = plant.get("fuel_total_g")
     assert found_g == pytest.approx(late_g, rel=0.05)
+    assert np.sum(np.diff(np.array(on, float)) > 0.0) == pytest.approx(late_starts, rel=0.1)
     run = simulate(trip, CONTROLLERS[fmi]).trajectory
     assert run.fuel_g.sum() == pytest.approx(in_order_g, rel=0.003)
 
