@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import pytest
+import shellingham
 import typer
 
 from qpmpc.cli.app import app
@@ -107,7 +108,9 @@ def test_each_kind_of_name_is_completed(command, parameter, begun, name):
         assert found.shell_complete(context, "\0no such") == []
 
 
-def test_completion_is_offered_for_bash(cli):
-    done = cli("--show-completion", "bash")
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_is_offered_for_the_shell_around(cli, monkeypatch, shell):
+    monkeypatch.setattr(shellingham, "detect_shell", lambda: (shell, f"/bin/{shell}"))
+    done = cli("--show-completion")
     assert done.code == 0
-    assert "_QPMPC_COMPLETE=complete_bash" in done.out
+    assert f"_QPMPC_COMPLETE=complete_{shell}" in done.out
