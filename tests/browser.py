@@ -73,6 +73,7 @@ def assert_works(file: Path, charts: int, tables: int, browser: Any = None) -> N
             page.evaluate(NARROWED)  # charts follow the window in one of the next frames
             assert max(page.evaluate(WIDTHS), default=0) <= 400
             assert page.evaluate("document.documentElement.scrollWidth") <= 400
+            assert page.evaluate(LOST) == []
             page.set_viewport_size({"width": A4, "height": 1000})
             page.emulate_media(media="print")
             assert page.evaluate("document.documentElement.scrollWidth") <= A4
@@ -86,6 +87,13 @@ CHARTS = "[...document.querySelectorAll('figure.chart')].flatMap(f => f.charts).
 # what is folded cannot be clicked
 FOLDED = "(document.querySelectorAll('details').forEach(d => { d.open = true; }), 0)"
 WIDTHS = "[...document.querySelectorAll('.uplot')].map(plot => plot.offsetWidth)"
+# names of rows that leave the window when their table is scrolled to the right
+LOST = """[...document.querySelectorAll('.scroll')].flatMap(box => {
+  box.scrollLeft = 1e4;
+  return [...box.querySelectorAll('tbody tr')].map(row => row.cells[0])
+    .filter(cell => cell.matches('.name') && cell.getBoundingClientRect().left < 0)
+    .map(cell => cell.innerText);
+})"""
 NARROWED = f"""new Promise(done => {{
   let frames = 0;
   const look = () => (
