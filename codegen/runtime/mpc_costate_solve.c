@@ -11,16 +11,14 @@
 /* All memory of this method is in the state: there is nothing to claim. */
 void mpc_method_claim(const mpc_state *state) { (void)state; }
 
-/* Multiplier of a limit that the last plan is near; else 0, see Multipliers.near. */
-static mpc_real near(const mpc_state *state, const mpc_stage *stage)
+/* What a limit of the coolant cost in the last plan; nothing if that has left it. */
+static mpc_real heat_near(const mpc_stage *stage)
 {
-    const mpc_real t_cl_k = stage->road.about_t_cl_end_degc - state->origin_t_cl_degc;
-    const mpc_real is_warm = above(t_cl_k - stage->p.of.t_low, NEAR_K);
-    const mpc_real is_cool = above(stage->p.of.t_high - t_cl_k, NEAR_K);
     const mpc_real heat = stage->y[MPC_ROW_HEAT];
-    const mpc_real positive = real_max(heat, REAL(0.0));
-    const mpc_real negative = real_min(heat, REAL(0.0));
-    return (positive * (REAL(1.0) - is_warm)) + (negative * (REAL(1.0) - is_cool));
+    const mpc_real t_cl_k = stage->x[MPC_VAR_T_CL];
+    const mpc_real inside_k = pick((heat > REAL(0.0)) ? 1 : 0, t_cl_k - stage->p.of.t_low,
+                                   stage->p.of.t_high - t_cl_k);
+    return pick((inside_k > NEAR_K) ? 1 : 0, REAL(0.0), heat);
 }
 
 /* The search is sound, or will be started anew. */
@@ -44,7 +42,7 @@ void mpc_method_start(mpc_state *state)
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         mpc_stage *const stage = &state->stage[k];
         stage->dual[0].charge = stage->y[MPC_ROW_CHARGE];
-        stage->dual[0].heat = near(state, stage);
+        stage->dual[0].heat = heat_near(stage);
     }
     mpc_costate_dual_at(state, 0);
 }

@@ -92,6 +92,22 @@ def test_a_multiplier_of_the_coolant_ends_at_zero_on_its_way_to_the_other_limit(
     assert half.charge == pytest.approx(np.full(4, 0.5))
 
 
+def test_a_coolant_limit_that_the_plan_has_left_has_no_multiplier():
+    p, _ = program("prius-nimh", 20, 0.6, 60.0, False)
+    at = Multipliers(np.full(len(p.t_low), 150.0), np.zeros_like(p.t_low))
+    low, high = at.heat.copy(), at.heat.copy()
+    low[:], high[:] = 0.1, -0.1
+    for off_k, stays in ((-0.5, True), (0.0, True), (0.5, True), (2.0, False)):
+        for heat, plan_degc in ((low, p.t_low + off_k), (high, p.t_high - off_k)):
+            found = Multipliers(at.charge, heat).near(p, plan_degc)
+            assert (found.heat == (heat if stays else 0.0)).all()
+            assert found.charge is at.charge
+    # the limit of the other side is none of its business
+    assert (Multipliers(at.charge, low).near(p, p.t_low - 50.0).heat == low).all()
+    assert (Multipliers(at.charge, high).near(p, p.t_high + 50.0).heat == high).all()
+
+
+
 @settings(deadline=None, max_examples=200)
 @given(st.integers(0, 10**6))
 def test_the_starts_of_a_block_in_closed_form_are_those_of_a_walk(seed):
