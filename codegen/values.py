@@ -62,8 +62,8 @@ OF_LEARNING = {  # beside those, where the fuel map is learned
     learned_fuel.__name__: {
         name: getattr(learned_fuel, name)
         for name in (
-            *("KEPT", "PRIOR", "PRIOR_LATE"),
-            *("RATIO_LEAST", "RATIO_MOST", "LEVEL_MOST", "TILT_MOST", "SUM_MOST"),
+            *("KEPT", "PRIOR_IDLE", "PRIOR_SLOPE", "PRIOR_LATE"),
+            *("RATIO_LEAST", "RATIO_MOST", "IDLE_MOST", "SLOPE_MOST", "SUM_MOST"),
         )
     }
 }

@@ -1,4 +1,5 @@
-/* Level and tilt of the fuel map by least squares, forgetful and bounded, from the fuel measured.
+/* Idle and slope that the fuel map lacks by least squares, forgetful and bounded, from the fuel
+ * measured.
  *
  * The same in Python, with the formulas: qpmpc/pwa/learned_fuel.py.
  */
@@ -17,17 +18,11 @@ static int32_t is_sum(mpc_wide x)
     return ((x >= -most) && (x <= most)) ? 1 : 0;
 }
 
-/* Place of a power between -1, idling, and 1, full power. */
-static mpc_real place(mpc_real p_eng_w)
-{
-    return ((REAL(2.0) * p_eng_w) / mpc_par.engine_max_w) - REAL(1.0);
-}
-
-/* Level, tilt and what is late as they are now, by elimination from the last. `weight` is the map's
+/* Idle, slope and what is late as they are now, by elimination from the last. `weight` is the map's
  * in the equation of each; no pivot is less, but by rounding. */
 static void solve(const mpc_learned *of, mpc_wide x[MPC_UNKNOWNS])
 {
-    static const mpc_wide weight[MPC_UNKNOWNS] = {(mpc_wide)PRIOR, (mpc_wide)PRIOR,
+    static const mpc_wide weight[MPC_UNKNOWNS] = {(mpc_wide)PRIOR_IDLE, (mpc_wide)PRIOR_SLOPE,
                                                   (mpc_wide)PRIOR_LATE, (mpc_wide)PRIOR_LATE,
                                                   (mpc_wide)PRIOR_LATE};
     mpc_wide a[MPC_UNKNOWNS][MPC_UNKNOWNS];
@@ -38,7 +33,6 @@ static void solve(const mpc_learned *of, mpc_wide x[MPC_UNKNOWNS])
         a[i][i] += weight[i];
         x[i] = of->product[i];
     }
-    x[0] += weight[0];
     for (int32_t k = MPC_UNKNOWNS - 1; k >= 0; k--) {
         a[k][k] = (a[k][k] > weight[k]) ? a[k][k] : weight[k];
         for (int32_t i = 0; i < k; i++) {
@@ -57,38 +51,48 @@ static void solve(const mpc_learned *of, mpc_wide x[MPC_UNKNOWNS])
     }
 }
 
-/* Learn from a second in which so much was measured, as a share of the fuel at full power. */
-static void learn(mpc_learned *of, mpc_real measured, mpc_real start)
+/* Learn from a second in which so much more was measured than the map and a start take. */
+static void learn(mpc_learned *of, mpc_wide more)
 {
     mpc_wide found[MPC_UNKNOWNS];
     mpc_wide x[MPC_UNKNOWNS];
     solve(of, found);
-    x[0] = (mpc_wide)of->fuel[0] - (mpc_wide)start;
-    x[1] = (mpc_wide)of->tilted[0];
+    x[0] = (mpc_wide)of->cold[0];
+    x[1] = (mpc_wide)of->load[0];
     for (int32_t j = 1; j <= MPC_LATE; j++) {
-        const mpc_real late = real_clip((mpc_real)found[1 + j], REAL(0.0), REAL(1.0));
-        x[1] += (mpc_wide)late * ((mpc_wide)of->tilted[j] - (mpc_wide)of->tilted[j - 1]);
+        const mpc_wide late = (mpc_wide)real_clip((mpc_real)found[1 + j], REAL(0.0), REAL(1.0));
+        x[0] += late * ((mpc_wide)of->cold[j] - (mpc_wide)of->cold[j - 1]);
+        x[1] += late * ((mpc_wide)of->load[j] - (mpc_wide)of->load[j - 1]);
         x[1 + j] = (mpc_wide)of->fuel[j] - (mpc_wide)of->fuel[j - 1];
     }
     const mpc_wide kept = (mpc_wide)KEPT;
-    const mpc_wide seen = (mpc_wide)measured - (mpc_wide)start;
     for (int32_t i = 0; i < MPC_UNKNOWNS; i++) {
         for (int32_t j = 0; j < MPC_UNKNOWNS; j++) {
             of->square[i][j] = (kept * of->square[i][j]) + (x[i] * x[j]);
         }
-        of->product[i] = (kept * of->product[i]) + (seen * x[i]);
+        of->product[i] = (kept * of->product[i]) + (more * x[i]);
     }
 }
 
-/* Put a second in front of those before, or forget them all. */
-static void remember(mpc_learned *of, mpc_real fuel, mpc_real tilted, int32_t is_over)
+/* Put a second in front of those before. */
+static void remember(mpc_learned *of, mpc_real fuel, mpc_real cold, mpc_real load)
 {
     for (int32_t j = MPC_LATE; j > 0; j--) {
-        of->fuel[j] = (is_over != 0) ? REAL(0.0) : of->fuel[j - 1];
-        of->tilted[j] = (is_over != 0) ? REAL(0.0) : of->tilted[j - 1];
+        of->fuel[j] = of->fuel[j - 1];
+        of->cold[j] = of->cold[j - 1];
+        of->load[j] = of->load[j - 1];
     }
     of->fuel[0] = fuel;
-    of->tilted[0] = tilted;
+    of->cold[0] = cold;
+    of->load[0] = load;
+}
+
+/* Forget the last seconds: no fuel of theirs can come. */
+static void forget_seconds(mpc_learned *of)
+{
+    for (int32_t j = 0; j <= MPC_LATE; j++) {
+        remember(of, REAL(0.0), REAL(0.0), REAL(0.0));
+    }
 }
 
 /* Full power also stands for one that is not known, and teaches nothing while its fuel may come. */
@@ -100,11 +104,12 @@ void mpc_learned_take(mpc_state *state)
     if ((is_on != 0) || (of->left_s > 0)) {
         const mpc_real p_eng_w = good->p_eng_before_w;
         const mpc_real rated_g = mpc_par.learned_map_g_per_s[MPC_FUEL_PIECES];
-        const mpc_real map_g = mpc_map_cold_factor(good->t_cl_degc) * mpc_map_fuel_g_per_s(p_eng_w);
+        mpc_real cold = REAL(0.0);
         mpc_real share = REAL(0.0);
         mpc_real start = REAL(0.0);
         if (is_on != 0) {
-            share = map_g / rated_g;
+            cold = mpc_map_cold_factor(good->t_cl_degc);
+            share = (cold * mpc_map_fuel_g_per_s(p_eng_w)) / rated_g;
             start = (good->engine_for_s == 1) ? (state->cal.start_fuel_g / rated_g) : REAL(0.0);
         }
         of->left_s = (is_on != 0) ? MPC_LATE : (of->left_s - 1);
@@ -113,7 +118,7 @@ void mpc_learned_take(mpc_state *state)
         } else {
             of->void_s = (of->void_s > 0) ? (of->void_s - 1) : 0;
         }
-        remember(of, share + start, share * place(p_eng_w), 0);
+        remember(of, share + start, cold, cold * (p_eng_w / mpc_par.engine_max_w));
         mpc_real least = of->fuel[0];
         mpc_real most = of->fuel[0];
         for (int32_t j = 1; j <= MPC_LATE; j++) {
@@ -122,10 +127,10 @@ void mpc_learned_take(mpc_state *state)
         }
         const mpc_real measured = good->fuel_g / rated_g; /* below 0 if it is not known */
         if ((of->void_s == 0) && (within(measured, RATIO_LEAST * least, RATIO_MOST * most) != 0)) {
-            learn(of, measured, start);
+            learn(of, ((mpc_wide)measured - (mpc_wide)start) - (mpc_wide)share);
         }
         if (of->left_s == 0) {
-            remember(of, REAL(0.0), REAL(0.0), 1);
+            forget_seconds(of);
         }
     }
 }
@@ -141,13 +146,14 @@ void mpc_learned_curve(mpc_state *state)
     mpc_learned *const of = &state->learned;
     mpc_wide found[MPC_UNKNOWNS];
     solve(of, found);
-    const mpc_real level =
-        real_clip((mpc_real)found[0], REAL(1.0) - LEVEL_MOST, REAL(1.0) + LEVEL_MOST);
-    const mpc_real tilt = real_clip((mpc_real)found[1], -TILT_MOST, TILT_MOST);
+    const mpc_real rated_g = mpc_par.learned_map_g_per_s[MPC_FUEL_PIECES];
+    const mpc_real idle_least = real_max(-IDLE_MOST, -(mpc_par.learned_map_g_per_s[0] / rated_g));
+    const mpc_real idle = real_clip((mpc_real)found[0], idle_least, IDLE_MOST);
+    const mpc_real slope = real_clip((mpc_real)found[1], -SLOPE_MOST, SLOPE_MOST);
     mpc_real fuel[MPC_FUEL_PIECES + 1];
     for (int32_t k = 0; k <= MPC_FUEL_PIECES; k++) {
-        const mpc_real factor = level + (tilt * place(mpc_par.learned_power_w[k]));
-        fuel[k] = mpc_par.learned_map_g_per_s[k] * factor;
+        const mpc_real more = idle + (slope * (mpc_par.learned_power_w[k] / mpc_par.engine_max_w));
+        fuel[k] = mpc_par.learned_map_g_per_s[k] + (rated_g * more);
     }
     mpc_real value = fuel[0];
     for (int32_t k = 0; k < MPC_FUEL_PIECES; k++) {
@@ -173,8 +179,8 @@ int32_t mpc_learned_check(const mpc_state *state)
     const mpc_learned *const of = &state->learned;
     int32_t fine = is_count(of->left_s, MPC_LATE) & is_count(of->void_s, MPC_LATE + 1);
     for (int32_t j = 0; j <= MPC_LATE; j++) {
-        fine &= within(of->fuel[j], REAL(0.0), SUM_MOST)
-                & within(of->tilted[j], -SUM_MOST, SUM_MOST);
+        fine &= within(of->fuel[j], REAL(0.0), SUM_MOST) & within(of->cold[j], REAL(0.0), SUM_MOST)
+                & within(of->load[j], REAL(0.0), SUM_MOST);
     }
     for (int32_t i = 0; i < MPC_UNKNOWNS; i++) {
         for (int32_t j = 0; j < MPC_UNKNOWNS; j++) {

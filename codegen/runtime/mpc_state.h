@@ -63,7 +63,7 @@ typedef struct {
 #if MPC_LEARNING
 enum {
     MPC_LATE = 3,    /* seconds that fuel may be measured late, at most */
-    MPC_UNKNOWNS = 5 /* level, tilt, and what is late by so many seconds or more */
+    MPC_UNKNOWNS = 5 /* idle, slope, and what is late by so many seconds or more */
 };
 
 /* Double in single precision too: sums over a quarter of an hour beside what the map counts in them,
@@ -73,10 +73,11 @@ typedef double mpc_wide;
 /* What is known of the fuel map, see mpc_learned.c: the last seconds, sums over all before; and the
  * curve that is made of them. Fuel is a share of that at full power. */
 typedef struct {
-    int32_t left_s;                /* in which fuel of the engine, now off, may still be measured */
-    int32_t void_s;                /* that teach nothing */
-    mpc_real fuel[MPC_LATE + 1];   /* the map's, starts included, in the last second and before */
-    mpc_real tilted[MPC_LATE + 1]; /* the map's times the place of its power, without starts */
+    int32_t left_s;              /* in which fuel of the engine, now off, may still be measured */
+    int32_t void_s;              /* that teach nothing */
+    mpc_real fuel[MPC_LATE + 1]; /* the map's, starts included, in the last second and before */
+    mpc_real cold[MPC_LATE + 1]; /* cold multiplier, 0 with the engine off */
+    mpc_real load[MPC_LATE + 1]; /* the same times the share of full power */
     mpc_wide square[MPC_UNKNOWNS][MPC_UNKNOWNS];
     mpc_wide product[MPC_UNKNOWNS];
     mpc_real slope[MPC_FUEL_PIECES];

@@ -17,36 +17,38 @@ Floats = NDArray[np.float64]
 LATE_S = 3  # that fuel may be measured late, at most
 KEPT = exp(-1.0 / 900.0)  # of what is known, from one sample to the next
 NOISE = 0.002  # of a sample's fuel, of that at full power
-PRIOR = (NOISE / 0.1) ** 2  # a map is wrong by 10 %
+PRIOR_IDLE = (NOISE / 0.02) ** 2  # a map is wrong by 2 % of the fuel at full power when idling
+PRIOR_SLOPE = (NOISE / 0.1) ** 2  # and by 10 % of it more at full power
 PRIOR_LATE = NOISE**2  # all fuel is measured late
-LEVEL_MOST, TILT_MOST = 0.3, 0.25  # greatest distance from the map
+IDLE_MOST, SLOPE_MOST = 0.05, 0.3  # greatest distance from the map
 RATIO_LEAST, RATIO_MOST = 0.5, 2.0  # of measured fuel and the map's: beyond is no engine's
 SUM_MOST = 1e6  # no sum gets there
 BEND = 0.1  # tilt at which the breakpoints are chosen
 
 UNKNOWNS = 2 + LATE_S
-WEIGHT = np.array([PRIOR, PRIOR, *[PRIOR_LATE] * LATE_S])  # of the map
-MAP = WEIGHT * np.eye(UNKNOWNS)[0]  # level 1
+WEIGHT = np.array([PRIOR_IDLE, PRIOR_SLOPE, *[PRIOR_LATE] * LATE_S])  # of the map
 
 
 class LearnedFuel:
-    """Level and tilt of the fuel map by least squares, forgetful and bounded.
+    """Idle and slope that the fuel map lacks by least squares, forgetful and bounded.
 
-    With p = 2 P / P_max - 1, f_j the map's fuel j seconds ago, of the cold engine, as a share of
-    that at full power, s_j the fuel of a start, and u_j = f_j + s_j, each second with the engine on
-    and the LATE_S after it, in which m is measured, is a sample
+    All fuel is a share of that at full power. With q = P / P_max, f_j the map's fuel j seconds ago,
+    of the cold engine, s_j the fuel of a start, u_j = f_j + s_j, and a_j the cold multiplier, 0 with
+    the engine off, each second with the engine on and the LATE_S after it, in which m is measured, is
+    a sample
 
-        m - s_0 = level f_0 + tilt (f_0 p_0 + sum_j late_j (f_j p_j - f_j-1 p_j-1))
-                  + sum_j late_j (u_j - u_j-1),    j = 1 .. LATE_S
+        m - s_0 - f_0 = idle (a_0 + sum_j late_j (a_j - a_j-1))
+                        + slope (a_0 q_0 + sum_j late_j (a_j q_j - a_j-1 q_j-1))
+                        + sum_j late_j (u_j - u_j-1),    j = 1 .. LATE_S
 
     in which late_j is the share of fuel that is measured j seconds late or more: exact for every
-    meter whose fuel comes within LATE_S, if level is 1. Without these terms a late meter would make
-    every rise of power look as if the map were too high there. With tilt, late_j is what was known
+    meter whose fuel comes within LATE_S. Without these terms a late meter would make every rise of
+    power look as if the map were too high there. With idle and slope, late_j is what was known
     before, between 0 and 1. Left out is what is no engine's at any delay: below RATIO_LEAST times
     the least u_j, or above RATIO_MOST times the greatest. What is known counts KEPT times as much
-    from sample to sample; the map, level 1 and tilt 0, counts as PRIOR, a meter in time as
-    PRIOR_LATE. The curve in use is the greatest convex function below c(p) f(P), where
-    c = level + tilt p, at the breakpoints,
+    from sample to sample; the map, idle and slope 0, counts as PRIOR_IDLE and PRIOR_SLOPE, a meter
+    in time as PRIOR_LATE. The curve in use is the greatest convex function below
+    f(P) + idle + slope q at the breakpoints,
 
         slope_k = max over i <= k of min over j > k of (f_j - f_i) / (P_j - P_i).
 
@@ -60,7 +62,7 @@ class LearnedFuel:
 
     Attributes
     ----------
-    level, tilt : as they are now
+    power_w, map_g_per_s : breakpoints and the map there
     most_g : more fuel than any second can take
     """
 
@@ -80,7 +82,8 @@ class LearnedFuel:
         """Go back to the map."""
         self._square = np.zeros((UNKNOWNS, UNKNOWNS))
         self._product = np.zeros(UNKNOWNS)
-        self._fuel, self._tilted = np.zeros(1 + LATE_S), np.zeros(1 + LATE_S)  # u_j, f_j p_j
+        self._fuel = np.zeros(1 + LATE_S)  # u_j
+        self._lines = np.zeros((1 + LATE_S, 2))  # a_j, a_j q_j
         self._left_s = self._void_s = 0
 
     def take(
@@ -99,44 +102,47 @@ class LearnedFuel:
         if not engine_on and self._left_s == 0:
             return
         self._left_s = LATE_S if engine_on else self._left_s - 1
-        share = p = start = 0.0
+        alpha = share = q = start = 0.0
         if engine_on:
-            share = alpha_at(self._cold, t_cl_degc) * self._line.fuel.at(p_eng_w) / self._rated_g
-            p = 2.0 * p_eng_w / self._engine.power_max_w - 1.0
+            alpha = alpha_at(self._cold, t_cl_degc)
+            share = alpha * self._line.fuel.at(p_eng_w) / self._rated_g
+            q = p_eng_w / self._engine.power_max_w
             start = self._engine.start_fuel_g / self._rated_g if started else 0.0
-        self._void_s = 1 + LATE_S if p >= 1.0 else max(self._void_s - 1, 0)
+        self._void_s = 1 + LATE_S if q >= 1.0 else max(self._void_s - 1, 0)
         self._fuel = np.append(share + start, self._fuel[:-1])
-        self._tilted = np.append(share * p, self._tilted[:-1])
+        self._lines = np.vstack([(alpha, alpha * q), self._lines[:-1]])
         measured = fuel_g / self._rated_g
         least, most = RATIO_LEAST * self._fuel.min(), RATIO_MOST * self._fuel.max()
         if self._void_s == 0 and least <= measured <= most:
             late = np.clip(self._found[2:], 0.0, 1.0)
-            tilted = self._tilted[0] + late @ np.diff(self._tilted)
-            x = np.array([share, tilted, *np.diff(self._fuel)])
+            line = self._lines[0] + late @ np.diff(self._lines, axis=0)
+            x = np.append(line, np.diff(self._fuel))
             self._square = KEPT * self._square + np.outer(x, x)
-            self._product = KEPT * self._product + (measured - start) * x
+            self._product = KEPT * self._product + (measured - start - share) * x
         if self._left_s == 0:
-            self._fuel, self._tilted = np.zeros(1 + LATE_S), np.zeros(1 + LATE_S)
+            self._fuel, self._lines = np.zeros_like(self._fuel), np.zeros_like(self._lines)
 
     @property
     def _found(self) -> Floats:
-        """Level, tilt and what is late, as they are now."""
-        return np.linalg.solve(self._square + np.diag(WEIGHT), self._product + MAP)
+        """Idle, slope and what is late, as they are now."""
+        return np.linalg.solve(self._square + np.diag(WEIGHT), self._product)
 
     @property
-    def level_and_tilt(self) -> tuple[float, float]:
-        """As they are now."""
-        level, tilt = (float(value) for value in self._found[:2])
+    def idle_and_slope(self) -> tuple[float, float]:
+        """As they are now; no less fuel than none when idling."""
+        idle, slope = (float(value) for value in self._found[:2])
+        idle_least = max(-IDLE_MOST, -float(self.map_g_per_s[0]) / self._rated_g)
         return (
-            min(max(level, 1.0 - LEVEL_MOST), 1.0 + LEVEL_MOST),
-            min(max(tilt, -TILT_MOST), TILT_MOST),
+            min(max(idle, idle_least), IDLE_MOST),
+            min(max(slope, -SLOPE_MOST), SLOPE_MOST),
         )
 
     @property
     def curve(self) -> PwaFit:
         """The curve as it is now, g/s over W; the bounds of its error are not known."""
-        power, (level, tilt) = self.power_w, self.level_and_tilt
-        fuel = self.map_g_per_s * (level + tilt * (2.0 * power / self._engine.power_max_w - 1.0))
+        power, (idle, steeper) = self.power_w, self.idle_and_slope
+        more = idle + steeper * power / self._engine.power_max_w
+        fuel = self.map_g_per_s + self._rated_g * more
         with np.errstate(divide="ignore", invalid="ignore"):
             chord = (fuel[None, :] - fuel[:, None]) / (power[None, :] - power[:, None])
         pieces = range(len(power) - 1)
