@@ -81,7 +81,7 @@ class MhQpSettings(BaseModel):
         battery's own curve, see `qpmpc.qp.polish`
     prepared : solve the first QP before the trip starts; if not, the rules drive the first steps
         while the solver warms up
-    learning : correct level and tilt of the fuel map by the fuel injected, see `LearnedFuel`
+    learning : add idle and slope to the fuel map by the fuel injected, see `LearnedFuel`
     certificate : prove each second how good the plan is, see docs/costate.md; in Python alone
     """
 

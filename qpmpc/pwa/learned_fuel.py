@@ -33,9 +33,9 @@ class LearnedFuel:
     """Idle and slope that the fuel map lacks by least squares, forgetful and bounded.
 
     All fuel is a share of that at full power. With q = P / P_max, f_j the map's fuel j seconds ago,
-    of the cold engine, s_j the fuel of a start, u_j = f_j + s_j, and a_j the cold multiplier, 0 with
-    the engine off, each second with the engine on and the LATE_S after it, in which m is measured, is
-    a sample
+    of the cold engine, s_j the fuel of a start, u_j = f_j + s_j, and a_j the cold multiplier, 0
+    with the engine off, each second with the engine on and the LATE_S after it, in which m is
+    measured, is a sample
 
         m - s_0 - f_0 = idle (a_0 + sum_j late_j (a_j - a_j-1))
                         + slope (a_0 q_0 + sum_j late_j (a_j q_j - a_j-1 q_j-1))
@@ -125,7 +125,8 @@ class LearnedFuel:
     @property
     def _found(self) -> Floats:
         """Idle, slope and what is late, as they are now."""
-        return np.linalg.solve(self._square + np.diag(WEIGHT), self._product)
+        found = np.linalg.solve(self._square + np.diag(WEIGHT), self._product)
+        return np.asarray(found, dtype=float)
 
     @property
     def idle_and_slope(self) -> tuple[float, float]:

@@ -74,7 +74,7 @@ def test_a_meter_that_fails_is_flagged_and_leaves_the_map() -> None:
     assert run.trajectory.engine_on.any()
     learned = controller.planner.learned_fuel
     assert learned is not None
-    assert learned.level_and_tilt == (1.0, 0.0)
+    assert learned.idle_and_slope == (0.0, 0.0)
 
 
 def test_a_fault_of_a_meter_that_nobody_reads_is_said_to_be_idle() -> None:
@@ -89,6 +89,6 @@ def test_a_restart_forgets_what_was_learned() -> None:
     learned = controller.planner.learned_fuel
     assert learned is not None
     learned.take(1.0, 15e3, 90.0, True, False)
-    assert learned.level_and_tilt != (1.0, 0.0)
+    assert learned.idle_and_slope != (0.0, 0.0)
     controller.forget()
-    assert learned.level_and_tilt == (1.0, 0.0)
+    assert learned.idle_and_slope == (0.0, 0.0)

@@ -22,6 +22,7 @@ ENGINE_OF = "prius-nimh"  # whose map is not FASTSim's
 ROWS: tuple[tuple[tuple[str, ...], str | None, dict[str, object], str], ...] = (
     ((OWN, "rule-based", "ecms", "mh-qp", "dp"), None, {}, "{}"),
     (("rule-based", "mh-qp"), ENGINE_OF, {}, f"{{}}, engine of {ENGINE_OF}"),
+    (("mh-qp",), ENGINE_OF, {"mh_qp.learning": True}, f"{{}}, engine of {ENGINE_OF}, learned"),
     (("mh-qp",), None, {"engine.min_on_s": 0}, "{}, engine free to stop"),
 )
 DP_GRID = {"dp.grid": "quick"}  # ten times as fast, and off by less than what is at stake here
