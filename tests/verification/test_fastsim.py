@@ -7,7 +7,7 @@ from pathlib import Path
 import fastsim
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import qpmpc
@@ -89,6 +89,7 @@ def test_own_control_is_fastsims_balanced_run() -> None:
     assert abs(run.soc_correction_g) < 0.005 / run.vehicle.trip.eta_eq * run.fuel_g
 
 
+@settings(deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_commands_that_can_be_obeyed_are_obeyed(seed: int) -> None:
     """Any power up to the ramp, at any second of a drive whose battery stays in the middle."""
