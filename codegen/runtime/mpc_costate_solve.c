@@ -16,8 +16,8 @@ static mpc_real heat_near(const mpc_stage *stage)
 {
     const mpc_real heat = stage->y[MPC_ROW_HEAT];
     const mpc_real t_cl_k = stage->x[MPC_VAR_T_CL];
-    const mpc_real inside_k = pick((heat > REAL(0.0)) ? 1 : 0, t_cl_k - stage->p.of.t_low,
-                                   stage->p.of.t_high - t_cl_k);
+    const mpc_real inside_k =
+        pick((heat > REAL(0.0)) ? 1 : 0, t_cl_k - stage->p.of.t_low, stage->p.of.t_high - t_cl_k);
     return pick((inside_k > NEAR_K) ? 1 : 0, REAL(0.0), heat);
 }
 

@@ -107,7 +107,6 @@ def test_a_coolant_limit_that_the_plan_has_left_has_no_multiplier():
     assert (Multipliers(at.charge, high).near(p, p.t_high + 50.0).heat == high).all()
 
 
-
 @settings(deadline=None, max_examples=200)
 @given(st.integers(0, 10**6))
 def test_the_starts_of_a_block_in_closed_form_are_those_of_a_walk(seed):

@@ -84,10 +84,11 @@ int32_t mpc_part_step(mpc_instance_state *state, char *message)
     const int32_t wrong = state->part.wrong_entry;
     int32_t status = MPC_OK;
     if (wrong >= 0) { /* each alone is within its bounds */
-        (void)snprintf(message, MPC_MESSAGE,
-                       "the calibration is refused, the last good one is in use: %s is too high for "
-                       "another number",
-                       mpc_variables[MPC_VALUE_OF_CALIBRATION + wrong].name);
+        (void)snprintf(
+            message, MPC_MESSAGE,
+            "the calibration is refused, the last good one is in use: %s is too high for "
+            "another number",
+            mpc_variables[MPC_VALUE_OF_CALIBRATION + wrong].name);
         status = MPC_WARNING;
     }
     state->part.controller = state->part.decided;
