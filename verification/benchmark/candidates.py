@@ -12,7 +12,7 @@ from qpmpc.problems import shown_value
 from qpmpc.registry import check_controllers, controller_names
 from qpmpc.solvers.names import make_solver, solver_names
 
-ITERATIONS = (10, 15, 25, 35, 50, 100, 200, 400)
+ITERATIONS = (10, 15, 25, 30, 50, 100, 200, 400)
 RHOS = (0.01, 0.03, 0.3, 1.0)
 RIVAL_TOLERANCE = 1e-5
 GENERATED = "generated C, fixed K"
