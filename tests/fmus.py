@@ -1,7 +1,7 @@
 """FMUs opened by FMPy: values by name, steps of one second, what was logged."""
 
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -128,3 +128,51 @@ def connect(source: Unit, target: Unit, names: Iterable[str]) -> None:
 CONTROLLERS = {"2": "mh-qp", "3": "mh-costate"}  # that the tests export, by version of FMI
 TO_CONTROLLER = ("soc", "t_cl_degc", "demand_w", "speed_mps", "engine_on")
 TO_PLANT = ("engine_on_command", "p_eng_command_w")
+SHOWN = ("soc", "t_cl_degc", "fuel_g", "p_eng_w", "p_bat_w")  # of the plant, in a loop
+
+
+class Loop:
+    """A controller and a plant, initialised.
+
+    Parameters
+    ----------
+    controller, plant : instances that are new or reset
+    asks : whether the master reads outputs before it steps anything
+    tuned : parameters of the controller
+    initial : parameters of the plant
+    """
+
+    def __init__(
+        self,
+        controller: Unit,
+        plant: Unit,
+        asks: bool = False,
+        tuned: Mapping[str, float] | None = None,
+        **initial: float,
+    ) -> None:
+        self.controller, self.plant, self.asks = controller, plant, asks
+        plant.start(**initial)
+        measured = dict(zip(TO_CONTROLLER, plant.get(*TO_CONTROLLER), strict=True))
+        controller.start(**measured, **(tuned or {}))
+
+    def second(self, at: int) -> list[float]:
+        """Drive one second; what the plant shows then, and the controller's command."""
+        connect(self.plant, self.controller, TO_CONTROLLER)
+        if self.asks:
+            connect(self.controller, self.plant, TO_PLANT)
+            self.plant.step(at)
+            self.controller.step(at)
+        else:
+            self.controller.step(at)
+            connect(self.controller, self.plant, TO_PLANT)
+            self.plant.step(at)
+        return [*self.plant.get(*SHOWN), *self.controller.get("p_eng_command_w", "flags", "rung")]
+
+    def drive(self, seconds: Iterable[int]) -> list[list[float]]:
+        """Drive these seconds; what `second` returns of each."""
+        return [self.second(t) for t in seconds]
+
+    def reset(self) -> None:
+        """Make both as new, for another loop."""
+        for unit in (self.controller, self.plant):
+            unit.fmu.reset()

@@ -94,17 +94,16 @@ def test_a_multiplier_of_the_coolant_ends_at_zero_on_its_way_to_the_other_limit(
 
 def test_a_coolant_limit_that_the_plan_has_left_has_no_multiplier():
     p, _ = program("prius-nimh", 20, 0.6, 60.0, False)
-    at = Multipliers(np.full(len(p.t_low), 150.0), np.zeros_like(p.t_low))
-    low, high = at.heat.copy(), at.heat.copy()
-    low[:], high[:] = 0.1, -0.1
+    charge = np.full(len(p.t_low), 150.0)
+    low, high = np.full_like(charge, 0.1), np.full_like(charge, -0.1)
     for off_k, stays in ((-0.5, True), (0.0, True), (0.5, True), (2.0, False)):
         for heat, plan_degc in ((low, p.t_low + off_k), (high, p.t_high - off_k)):
-            found = Multipliers(at.charge, heat).near(p, plan_degc)
+            found = Multipliers(charge, heat).near(p, plan_degc)
             assert (found.heat == (heat if stays else 0.0)).all()
-            assert found.charge is at.charge
+            assert found.charge is charge
     # the limit of the other side is none of its business
-    assert (Multipliers(at.charge, low).near(p, p.t_low - 50.0).heat == low).all()
-    assert (Multipliers(at.charge, high).near(p, p.t_high + 50.0).heat == high).all()
+    assert (Multipliers(charge, low).near(p, p.t_low - 50.0).heat == low).all()
+    assert (Multipliers(charge, high).near(p, p.t_high + 50.0).heat == high).all()
 
 
 @settings(deadline=None, max_examples=200)

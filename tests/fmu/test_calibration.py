@@ -2,7 +2,7 @@
 
 import pytest
 from fmpy.fmi1 import FMICallException
-from fmus import CONTROLLERS, TO_CONTROLLER, TO_PLANT, Unit, connect
+from fmus import CONTROLLERS, Loop, Unit
 
 from qpmpc import simulate
 from qpmpc.codegen.controller import GeneratedController
@@ -12,6 +12,7 @@ GENERATED = {"2": GeneratedController, "3": GeneratedCostate}
 WITHIN_G = {"2": 1e-9, "3": 1e-5}  # see test_closed_loop.py
 WARM = {"t_cl_min_degc": 46.0, "t_min_degc": 47.0}
 DISCARD = 2
+FLAGS = -2  # their place in what a loop shows of a second
 CONTRADICTION = (
     "the calibration is refused, the last good one is in use: soc_min is too high for another "
     "number"
@@ -29,22 +30,16 @@ def units(fmus, fmi):
         yield controller, plant
 
 
-def begin(controller, plant, **numbers):
-    plant.start()
-    measured = dict(zip(TO_CONTROLLER, plant.get(*TO_CONTROLLER), strict=True))
-    controller.start(**measured, **numbers)
+def flags(driven):
+    return {second[FLAGS] for second in driven}
 
 
-def drive(controller, plant, seconds):
-    """Drive these seconds; command and flags of each."""
-    found = []
-    for t in seconds:
-        connect(plant, controller, TO_CONTROLLER)
-        controller.step(t)
-        connect(controller, plant, TO_PLANT)
-        plant.step(t)
-        found.append(controller.get("p_eng_command_w", "flags"))
-    return found
+def as_it_is(units, seconds):
+    """What is driven with the page as it is, and a loop that begins anew."""
+    loop = Loop(*units)
+    driven = loop.drive(range(seconds))
+    loop.reset()
+    return driven, Loop(*units)
 
 
 def test_the_whole_page_is_listed(units, trip, fmi):
@@ -63,8 +58,7 @@ def test_the_whole_page_is_listed(units, trip, fmi):
 
 def test_set_before_departure_it_is_calibrate_in_python(units, trip, fmi):
     controller, plant = units
-    begin(controller, plant, **WARM)
-    drive(controller, plant, range(trip.steps))
+    Loop(controller, plant, tuned=WARM).drive(range(trip.steps))
     calibrated = GENERATED[fmi](trip)
     calibrated.calibrate(WARM)
     expected_g = simulate(trip, calibrated).fuel_g
@@ -74,49 +68,42 @@ def test_set_before_departure_it_is_calibrate_in_python(units, trip, fmi):
 
 
 def test_set_under_way_it_acts_from_the_next_command_on(units, fmi):
-    controller, plant = units
-    begin(controller, plant)
-    as_it_is = drive(controller, plant, range(200))
-    controller.fmu.reset()
-    plant.fmu.reset()
-    begin(controller, plant)
-    before = drive(controller, plant, range(100))
-    controller.set(t_max_degc=60.0, t_cl_min_degc=52.0, t_min_degc=53.0)
-    after = drive(controller, plant, range(100, 200))
-    assert before == as_it_is[:100]
-    assert after != as_it_is[100:]
-    assert not any(flags for _, flags in after)
+    expected, loop = as_it_is(units, 200)
+    before = loop.drive(range(100))
+    loop.controller.set(t_max_degc=60.0, t_cl_min_degc=52.0, t_min_degc=53.0)
+    after = loop.drive(range(100, 200))
+    assert before == expected[:100]
+    assert after != expected[100:]
+    assert flags(after) == {0}
 
 
 @pytest.mark.parametrize("value", [1.01, -1.0, float("nan")])
 def test_a_number_beyond_its_bounds_is_discarded(units, value):
     controller, plant = units
-    begin(controller, plant)
-    drive(controller, plant, range(3))
+    loop = Loop(controller, plant)
+    loop.drive(range(3))
     controller.logged.clear()
     with pytest.raises(FMICallException) as caught:
         controller.set(soc_min=value)
     assert caught.value.status == DISCARD
     assert controller.logged == [f"soc_min is {value:.9g}: it must be 0.04 to 1"]
     assert controller.get("soc_min") == [0.4]
-    assert not any(flags for _, flags in drive(controller, plant, range(3, 6)))
+    assert flags(loop.drive(range(3, 6))) == {0}
 
 
 def test_numbers_that_contradict_are_refused_until_they_are_right(units):
-    """A warning and a flag each second; the commands are those of the page before."""
-    controller, plant = units
-    begin(controller, plant)
-    as_it_is = drive(controller, plant, range(60))
-    controller.fmu.reset()
-    plant.fmu.reset()
-    begin(controller, plant)
-    first = drive(controller, plant, range(40))
+    """A warning and a flag each second; what is driven is as with the page before."""
+    expected, loop = as_it_is(units, 60)
+    controller = loop.controller
+    first = loop.drive(range(40))
     controller.set(soc_min=0.9)
-    refused = drive(controller, plant, range(40, 50))
+    refused = loop.drive(range(40, 50))
     assert controller.logged == 10 * [CONTRADICTION]
-    assert {flags for _, flags in refused} == {64}
+    assert flags(refused) == {64}
     controller.set(soc_min=0.4)
-    last = drive(controller, plant, range(50, 60))
-    assert [p for p, _ in first + refused + last] == [p for p, _ in as_it_is]
+    last = loop.drive(range(50, 60))
+    assert [second[:FLAGS] for second in first + refused + last] == [
+        second[:FLAGS] for second in expected
+    ]
     assert len(controller.logged) == 10
-    assert not any(flags for _, flags in last)
+    assert flags(last) == {0}

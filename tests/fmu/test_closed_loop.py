@@ -6,36 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
-from fmus import CONTROLLERS, TO_CONTROLLER, TO_PLANT, Unit, connect
+from fmus import CONTROLLERS, SHOWN, TO_CONTROLLER, TO_PLANT, Loop, Unit, connect
 
 from qpmpc import simulate
 
 # mh-costate's search counts a step from a rise of 1e-7 g on; where it rises by just that, rounding
 # decides, which moves the power by up to 1 W of 10 kW: see docs/embedded.md
 WITHIN = {"2": 1e-8, "3": 1e-5}
-SHOWN = ("soc", "t_cl_degc", "fuel_g", "p_eng_w", "p_bat_w")
-
-
-class Loop:
-    """A controller and a plant; `asks` is a master that reads outputs before it steps anything."""
-
-    def __init__(self, controller: Unit, plant: Unit, asks: bool = False, **initial: float) -> None:
-        self.controller, self.plant, self.asks = controller, plant, asks
-        plant.start(**initial)
-        controller.start(**dict(zip(TO_CONTROLLER, plant.get(*TO_CONTROLLER), strict=True)))
-
-    def second(self, at: int) -> list[float]:
-        """Drive one second; what the plant shows then, and the controller's command."""
-        connect(self.plant, self.controller, TO_CONTROLLER)
-        if self.asks:
-            connect(self.controller, self.plant, TO_PLANT)
-            self.plant.step(at)
-            self.controller.step(at)
-        else:
-            self.controller.step(at)
-            connect(self.controller, self.plant, TO_PLANT)
-            self.plant.step(at)
-        return [*self.plant.get(*SHOWN), *self.controller.get("p_eng_command_w", "flags", "rung")]
 
 
 @pytest.mark.parametrize("what", ["controller2", "plant2", "controller3", "plant3"])
@@ -101,7 +78,7 @@ def test_instances_side_by_side_are_as_alone(fmus, fmi):
     for values in initial:
         with Unit(controller) as c, Unit(plant) as p:
             loop = Loop(c, p, **values)
-            alone.append([loop.second(t) for t in seconds])
+            alone.append(loop.drive(seconds))
     assert alone[0] != alone[1]
     with Unit(controller) as c, Unit(plant) as p:
         units = (c.beside(), p.beside())
@@ -117,12 +94,11 @@ def test_instances_side_by_side_are_as_alone(fmus, fmi):
 def test_reset_is_as_new(fmus, fmi):
     with Unit(fmus[f"controller{fmi}"]) as c, Unit(fmus[f"plant{fmi}"]) as p:
         loop = Loop(c, p, soc_init=0.5)
-        first = [loop.second(t) for t in range(30)]
-        c.fmu.reset()
-        p.fmu.reset()
+        first = loop.drive(range(30))
+        loop.reset()
         assert p.get("soc", "time") == [0.6, 0.0]
         loop = Loop(c, p, soc_init=0.5)
-        again = [loop.second(t) for t in range(30)]
+        again = loop.drive(range(30))
     assert first == again
 
 
@@ -130,20 +106,19 @@ def test_reset_is_as_new(fmus, fmi):
 def test_a_saved_state_brings_all_back(fmus, fmi):
     with Unit(fmus[f"controller{fmi}"]) as c, Unit(fmus[f"plant{fmi}"]) as p:
         loop = Loop(c, p)
-        for t in range(100):
-            loop.second(t)
+        loop.drive(range(100))
         saved = [unit.state() for unit in (c, p)]
-        first = [loop.second(t) for t in range(100, 140)]
+        first = loop.drive(range(100, 140))
         for unit, state in zip((c, p), saved, strict=True):
             unit.restore(state)
-        assert [loop.second(t) for t in range(100, 140)] == first
+        assert loop.drive(range(100, 140)) == first
 
 
 def test_a_question_asked_twice_in_a_second_is_one_decision(fmus):
     """Outputs follow the inputs as often as these change; the last counts."""
     with Unit(fmus["controller2"]) as c, Unit(fmus["plant2"]) as p:
         loop = Loop(c, p, asks=True)
-        once = [loop.second(t) for t in range(40)]
+        once = loop.drive(range(40))
     with Unit(fmus["controller2"]) as c, Unit(fmus["plant2"]) as p:
         loop = Loop(c, p, asks=True)
         twice = []
