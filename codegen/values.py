@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from qpmpc.codegen.calibration import Calibration, calibration_of
 from qpmpc.codegen.forecast_values import fixed_block_s
 from qpmpc.codegen.shared_values import Sizes, shared_values
-from qpmpc.controllers import monitor, qp_planner, ramp, safety
+from qpmpc.controllers import monitor, qp_planner, ramp, realise, safety
 from qpmpc.controllers.qp_planner import DEPARTURE_LINEARISATIONS, WARM_UP_STEPS
 from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS
 from qpmpc.controllers.settings import MhQpSettings, RuleBasedSettings
@@ -44,6 +44,7 @@ CONSTANTS_OF_ALL = of_modules(
     (linearisation, "COLDEST_DEGC HOTTEST_DEGC DEPARTURE_FUEL_G_PER_S DEPARTURE_P_ENG_W"),
     (safety, "POWER_MARGIN_W SOC_MARGIN T_CL_MARGIN_K"),
     (monitor, "LONG_AGO_S LONGEST_GAP_S"),
+    (realise, "STAY_S STAY_SHARE"),
     (checked, "LONGEST_STAGE_S NEWS SAME_MEANS_W"),
     (swing, "NO_LIMIT_J LEAST_KEPT_J DRAIN_SHARE FILLED_SHARE"),
     (coolant_floor, "USABLE"),

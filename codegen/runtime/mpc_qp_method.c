@@ -70,7 +70,7 @@ void mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p_eng
         on_share[k] = state->stage[k].x[MPC_VAR_ON];
         p_eng_w[k] = state->stage[k].x[MPC_VAR_P_ENG];
     }
-    if (on_share[0] >= state->cal.on_threshold) {
+    if (on_share[0] >= real_min(state->cal.on_threshold, STAY_SHARE)) {
         const mpc_real share = real_min(on_share[0], REAL(1.0));
         p_eng_w[0] = share * mpc_polish_power_w(state, p_eng_w[0] / share);
     }

@@ -3,10 +3,12 @@
  * On where the share of the coming second is one half at least, but the engine is started only if
  * the mean over its shortest run is one half at least and arrival is no nearer, or if the battery
  * alone cannot drive or the car is too fast for an engine that is off; it is stopped only if the mean
- * over its shortest rest is one half at most and the car is not too fast within it.
+ * over its shortest rest is one half at most, the car is not too fast within it and, where a start
+ * costs something, little is left of the run by the plan.
  *
  * The same in Python, with the reasons: qpmpc/controllers/realise.py.
  */
+#include "mpc_constants.h"
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
@@ -24,6 +26,25 @@ static mpc_real mean_share(const mpc_state *state, int32_t first, int32_t second
         }
     }
     return sum / (mpc_real)count;
+}
+
+/* Whether a run goes on although its share is below the threshold: the part of it that goes on is
+ * the least share so far, because only a start makes the share rise. */
+static int32_t stays(const mpc_state *state, int32_t first)
+{
+#if MPC_STARTS
+    mpc_real least = REAL(1.0);
+    mpc_real left_s = REAL(0.0);
+    for (int32_t k = first; k < MPC_SHORT; k++) {
+        least = real_min(least, real_max(state->old_on_share[k], REAL(0.0)));
+        left_s += (k < state->old_arrival_s) ? least : REAL(0.0);
+    }
+    return ((state->old_on_share[first] >= STAY_SHARE) && (left_s >= STAY_S)) ? 1 : 0;
+#else
+    (void)state;
+    (void)first;
+    return 0;
+#endif
 }
 
 /* Whether the plan starts the engine, or stops it, for long enough. */
@@ -45,7 +66,7 @@ static int32_t keeps(const mpc_state *state, int32_t first, int32_t wish)
                                                             : MPC_SHORT;
         const int32_t is_known = (state->old_fast_s < MPC_SHORT) ? 1 : 0;
         const int32_t is_soon = ((fast_s < bound_s) || (fast_s == 0)) ? is_known : 0;
-        result = ((mean <= threshold) && (is_soon == 0)) ? 1 : 0;
+        result = ((mean <= threshold) && (is_soon == 0) && (stays(state, first) == 0)) ? 1 : 0;
     }
     return result;
 }
@@ -73,7 +94,8 @@ mpc_command mpc_realise(const mpc_state *state)
     int32_t is_found = 0;
     for (int32_t k = first; k < MPC_SHORT; k++) {
         const mpc_real share = state->old_on_share[k];
-        if ((on != 0) && (is_found == 0) && (share >= threshold)) {
+        const mpc_real least = (k == first) ? real_min(threshold, STAY_SHARE) : threshold;
+        if ((on != 0) && (is_found == 0) && (share >= least)) {
             command.p_eng_w = state->old_p_eng_w[k] / real_min(share, REAL(1.0));
             is_found = 1;
         }

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from qpmpc.controllers.monitor import Flag
 from qpmpc.controllers.qp_certificate import certificate_of
 from qpmpc.controllers.ramp import RampFloor
-from qpmpc.controllers.realise import ON_THRESHOLD
-from qpmpc.controllers.receding_horizon import Plan, Planner, power_while_on_w
+from qpmpc.controllers.realise import STAY_SHARE, power_while_on_w
+from qpmpc.controllers.receding_horizon import Plan, Planner
 from qpmpc.controllers.settings import ControllerSettings, MhQpSettings, SettingsLike
 from qpmpc.errors import InputError
 from qpmpc.preview.stages import Stages
@@ -178,7 +178,7 @@ class QpPlanner(Planner):
         short = slice(self.of_qp.horizon.short_stages)
         on_share = solved.x[short, Var.ON]
         power_w = power_while_on_w(on_share, solved.x[short, Var.P_ENG])
-        if self.of_qp.polish and on_share[0] >= ON_THRESHOLD:
+        if self.of_qp.polish and on_share[0] >= STAY_SHARE:
             net_w = float(solved.stages.net_w[0])
             prices = self.qp.prices(solved.duals)
             power_w[0] = self._polish.power_w(prices, net_w, float(power_w[0]))

@@ -9,11 +9,15 @@ The same in C: codegen/runtime/mpc_realise.c.
 import numpy as np
 from numpy.typing import NDArray
 
+from qpmpc.qp.rows import table_of
 from qpmpc.trip import Observation
 from qpmpc.vehicle.must_run import must_run, too_fast
 from qpmpc.vehicle.parameters import Vehicle
 
 ON_THRESHOLD = 0.5  # share of a 1 s stage from which on the engine runs
+# A run goes on below it, where that spares a start; chosen in docs/studies/tuning.md.
+STAY_SHARE = 0.35  # from this share on
+STAY_S = 2.0  # and if the plan has this much left of the run
 
 
 def engine_runs(
@@ -34,6 +38,9 @@ def engine_runs(
       is no nearer than b seconds, or if the battery alone cannot drive, the ramp asks for it or
       the car is too fast
     - it is stopped only if that mean is 1/2 at most and the car is not too fast within b seconds
+    - where a start costs something it is not stopped while sigma_0 >= `STAY_SHARE` and at least
+      `STAY_S` seconds are left of the run, in the mean of what the relaxed plan mixes:
+      sum_k min(sigma_0, .., sigma_k), up to arrival
 
     Parameters
     ----------
@@ -53,8 +60,39 @@ def engine_runs(
     ahead = np.clip(on_share[: max(min(bound_s, left_s), 1)], 0.0, 1.0)
     mean = float(ahead.sum()) / len(ahead)
     if not wish:
-        return mean > ON_THRESHOLD or (fast_s is not None and 0 <= fast_s < bound_s)
+        soon_fast = fast_s is not None and 0 <= fast_s < bound_s
+        return mean > ON_THRESHOLD or soon_fast or _stays(on_share[: max(left_s, 0)], vehicle)
     net_w = seen.demand_w + vehicle.battery.aux_power_w
     must = least_w > 0.0 or must_run(vehicle, net_w, seen.speed_mps)
     arrives = arrival_s is not None and arrival_s < bound_s
     return must or (mean >= ON_THRESHOLD and not arrives)
+
+
+def _stays(on_share: NDArray[np.float64], vehicle: Vehicle) -> bool:
+    """Whether a run goes on although its share is below `ON_THRESHOLD`.
+
+    The part of it that goes on in second k is the least share up to then: only a start makes the
+    share rise. To stop throws all of it away, and what is missing takes another start.
+    """
+    engine = vehicle.engine
+    if not table_of(engine).has_start or len(on_share) == 0 or on_share[0] < STAY_SHARE:
+        return False
+    left_s = np.minimum.accumulate(np.maximum(on_share, 0.0)).sum()
+    return bool(left_s >= STAY_S)
+
+
+def power_while_on_w(
+    on_share: NDArray[np.float64], p_eng_w: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Power E / sigma while on, of a mean power E; 0 where the engine will not run."""
+    runs = on_share >= STAY_SHARE
+    power = np.zeros_like(p_eng_w)
+    np.divide(p_eng_w, np.minimum(on_share, 1.0), out=power, where=runs)
+    return power
+
+
+def second_of_power(on_share: NDArray[np.float64]) -> int:
+    """Second whose power an engine that is to run gets: the first that the plan runs it in."""
+    if on_share[0] >= STAY_SHARE:
+        return 0
+    return int(np.argmax(on_share >= ON_THRESHOLD))

@@ -17,7 +17,7 @@ from qpmpc.controllers.base import (
     base_not_called,
 )
 from qpmpc.controllers.monitor import NOTHING_WRONG, Flag
-from qpmpc.controllers.realise import ON_THRESHOLD, engine_runs
+from qpmpc.controllers.realise import engine_runs, power_while_on_w, second_of_power
 from qpmpc.controllers.rule_based import RuleBased, last_rung
 from qpmpc.controllers.settings import SettingsLike
 from qpmpc.errors import QpmpcError
@@ -79,16 +79,6 @@ class Plan:
     ) -> "Plan":
         """Return the result of a planner that has found no plan, and why."""
         return cls(np.empty(0), np.empty(0), False, iterations, reason=reason, flags=flags)
-
-
-def power_while_on_w(
-    on_share: NDArray[np.float64], p_eng_w: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Power E / sigma while on, of a mean power E; 0 where the engine will not run."""
-    runs = on_share >= ON_THRESHOLD
-    power = np.zeros_like(p_eng_w)
-    np.divide(p_eng_w, np.minimum(on_share, 1.0), out=power, where=runs)
-    return power
 
 
 class Planner(Driver, ABC):
@@ -202,8 +192,8 @@ class RecedingHorizon(Controller):
         least_w = plan.least_w if second == 0 else 0.0
         if not engine_runs(ahead, arrival_s, seen, self.trip.vehicle, least_w, fast_s):
             return Command(False, 0.0)
-        running = second + int(np.argmax(ahead >= ON_THRESHOLD))
-        return Command(True, max(float(plan.power_on_w[running]), least_w))
+        running_w = float(plan.power_on_w[second + second_of_power(ahead)])
+        return Command(True, max(running_w, least_w))
 
     def _checked(self, plan: Plan, second: int) -> Plan:
         """Refuse what is no plan; take one that is not finite as unusable."""

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qpmpc.controllers.realise import engine_runs
+from qpmpc.controllers.realise import engine_runs, power_while_on_w, second_of_power
 from qpmpc.simulation import simulate
 from qpmpc.trip import Observation
 from qpmpc.vehicle import load_vehicle
@@ -38,6 +38,35 @@ SHARES = st.lists(st.floats(-0.1, 1.1), min_size=1, max_size=20).map(np.array)
 )
 def test_a_change_needs_most_of_the_seconds_that_it_binds(on_share, arrival_s, seen, runs):
     assert engine_runs(np.array(on_share, dtype=float), arrival_s, seen, CAR) is runs
+
+
+@pytest.mark.parametrize(
+    ("on_share", "arrival_s", "runs"),
+    [
+        ([0.4] * 6, None, True),  # 2.4 s left of the run
+        ([0.4] * 4, None, False),  # 1.6 s
+        ([0.4, 0.4, 0.1, *[0.45] * 5], None, False),  # what rises again is another start
+        ([0.3] * 20, None, False),  # most of what the plan mixes has stopped
+        ([0.4] * 6, 4, False),  # what is after arrival does not count
+        ([0.4] * 6, 5, True),
+        ([0.4, 0.5, 2.0, 2.0], None, False),  # the least so far counts
+        ([0.4, -1.0, 0.4, 0.4, 0.4, 0.4, 0.4], None, False),
+    ],
+)
+def test_a_run_goes_on_while_the_plan_has_two_seconds_left_of_it(on_share, arrival_s, runs):
+    """A stop would throw them away, and the plan get them back by another start."""
+    shares = np.array(on_share)
+    assert engine_runs(shares, arrival_s, ON, CAR) is runs
+    assert not engine_runs(shares, arrival_s, OFF, CAR)  # no start for them
+    assert not engine_runs(shares, arrival_s, ON, FREE)  # where a start costs nothing it stops
+
+
+def test_power_is_that_of_the_second_or_of_the_next_that_runs():
+    share, mean_w = np.array([0.4, 0.3, 0.8, 1.0]), np.array([4e3, 3e3, 4e3, 9e3])
+    power_w = power_while_on_w(share, mean_w)
+    np.testing.assert_allclose(power_w, [10e3, 0.0, 5e3, 9e3])
+    assert second_of_power(share) == 0
+    assert second_of_power(share[1:]) == 1
 
 
 @pytest.mark.parametrize("seen", [ON, OFF])

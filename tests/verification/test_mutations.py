@@ -271,7 +271,7 @@ MUTATIONS = [
         (limits_kept, bound_below_everything, relaxation_tight),
         also=Replacement(
             qpmpc.controllers.qp_planner, "power_while_on_w",
-            "runs = on_share >= ON_THRESHOLD", "runs = on_share >= 0.0",
+            "runs = on_share >= STAY_SHARE", "runs = on_share >= 0.0",
         ),
     ),
 ]  # fmt: skip

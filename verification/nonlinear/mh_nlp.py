@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from qpmpc.controllers.ramp import RampFloor
-from qpmpc.controllers.realise import ON_THRESHOLD
+from qpmpc.controllers.realise import STAY_SHARE
 from qpmpc.controllers.receding_horizon import Plan, Planner
 from qpmpc.controllers.settings import SettingsLike
 from qpmpc.trip import Observation, Trip
@@ -53,7 +53,7 @@ class MhNlp(Planner):
             return Plan.none("IPOPT does not converge", solved.iterations)
         on_share = solved.z[: self._short, NlpVar.ON]
         powers_w = np.zeros_like(on_share)
-        for stage in np.flatnonzero(on_share >= ON_THRESHOLD).tolist():
+        for stage in np.flatnonzero(on_share >= STAY_SHARE).tolist():
             powers_w[stage] = solved.power_on_w(stage)
         arrival_s = solved.stages.arrival_s(self._short)
         least_w = self._ramp.least_w(solved.stages.seconds_w(self._short), seen.soc)
