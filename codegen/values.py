@@ -44,7 +44,6 @@ CONSTANTS_OF_ALL = of_modules(
     (linearisation, "COLDEST_DEGC HOTTEST_DEGC DEPARTURE_FUEL_G_PER_S DEPARTURE_P_ENG_W"),
     (safety, "POWER_MARGIN_W SOC_MARGIN T_CL_MARGIN_K"),
     (monitor, "LONG_AGO_S LONGEST_GAP_S"),
-    (realise, "STAY_S STAY_SHARE"),
     (checked, "LONGEST_STAGE_S NEWS SAME_MEANS_W"),
     (swing, "NO_LIMIT_J LEAST_KEPT_J DRAIN_SHARE FILLED_SHARE"),
     (coolant_floor, "USABLE"),
@@ -56,6 +55,7 @@ CONSTANTS = CONSTANTS_OF_ALL | of_modules(
     (qp_planner, "FAILURES_FORGIVEN LEAST_SIZE_W"),
     (stage_qp, "LEAST_COST"),
     (polish, "LEAST_RATIO"),
+    (realise, "STAY_S STAY_SHARE"),
     (rows, "SHORTEST_SCALE_S SIGMA_FORCED COOL_SHARE MOOT_G_PER_S"),
 )
 

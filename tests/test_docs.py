@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import typer
+from caches import shared_cache
 
 from qpmpc.cli import main
 from qpmpc.cli.app import app
@@ -55,7 +56,7 @@ EXAMPLES = commands_in(
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Results of dynamic programming are shared here, but not with the user's own cache."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("QPMPC_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
+        patch.setenv("QPMPC_CACHE_DIR", shared_cache(tmp_path_factory))
         yield
 
 

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from caches import shared_cache
 
 FOLDER = Path(__file__).parents[1] / "examples"
 SCRIPTS = sorted(file.name for file in FOLDER.glob("*.py"))
@@ -19,7 +20,7 @@ ARGUMENTS = {"prototype_cost.py": ["10"]}  # seconds driven by each way
 @pytest.fixture(scope="module")
 def cache(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Folder of one cache for all of them, as on a user's machine: most have the same C library."""
-    return str(tmp_path_factory.mktemp("cache"))
+    return shared_cache(tmp_path_factory)
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from caches import shared_cache
 
 import qpmpc
 from qpmpc.cli.app import app
@@ -27,7 +28,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     folder = tmp_path_factory.mktemp("site")
     done = subprocess.run(
         [sys.executable, ROOT / "docs" / "website" / "build.py", folder],
-        env={**os.environ, "QPMPC_CACHE_DIR": str(tmp_path_factory.mktemp("cache"))},
+        env={**os.environ, "QPMPC_CACHE_DIR": shared_cache(tmp_path_factory)},
         capture_output=True,
         text=True,
         check=False,

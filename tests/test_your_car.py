@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from caches import shared_cache
 
 import qpmpc
 from qpmpc.cli import main
@@ -64,7 +65,7 @@ def folder(tmp_path_factory):
     (path / "log.csv").write_text(drive(), "utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(path)
-        patch.setenv("QPMPC_CACHE_DIR", str(path / "cache"))
+        patch.setenv("QPMPC_CACHE_DIR", shared_cache(tmp_path_factory))
         for step in STEPS:
             for name, text in HERE_FILE.findall(step):
                 Path(name).write_text(text, "utf-8")

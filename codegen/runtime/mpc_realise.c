@@ -28,11 +28,11 @@ static mpc_real mean_share(const mpc_state *state, int32_t first, int32_t second
     return sum / (mpc_real)count;
 }
 
+#if MPC_STARTS && !MPC_COSTATE /* shares of a smoothed dual rise without a start, too */
 /* Whether a run goes on although its share is below the threshold: the part of it that goes on is
- * the least share so far, because only a start makes the share rise. */
+ * the least share so far, because only a start makes the share of a relaxed plan rise. */
 static int32_t stays(const mpc_state *state, int32_t first)
 {
-#if MPC_STARTS
     mpc_real least = REAL(1.0);
     mpc_real left_s = REAL(0.0);
     for (int32_t k = first; k < MPC_SHORT; k++) {
@@ -40,12 +40,8 @@ static int32_t stays(const mpc_state *state, int32_t first)
         left_s += (k < state->old_arrival_s) ? least : REAL(0.0);
     }
     return ((state->old_on_share[first] >= STAY_SHARE) && (left_s >= STAY_S)) ? 1 : 0;
-#else
-    (void)state;
-    (void)first;
-    return 0;
-#endif
 }
+#endif
 
 /* Whether the plan starts the engine, or stops it, for long enough. */
 static int32_t keeps(const mpc_state *state, int32_t first, int32_t wish)
@@ -66,7 +62,10 @@ static int32_t keeps(const mpc_state *state, int32_t first, int32_t wish)
                                                             : MPC_SHORT;
         const int32_t is_known = (state->old_fast_s < MPC_SHORT) ? 1 : 0;
         const int32_t is_soon = ((fast_s < bound_s) || (fast_s == 0)) ? is_known : 0;
-        result = ((mean <= threshold) && (is_soon == 0) && (stays(state, first) == 0)) ? 1 : 0;
+        result = ((mean <= threshold) && (is_soon == 0)) ? 1 : 0;
+#if MPC_STARTS && !MPC_COSTATE
+        result = (stays(state, first) != 0) ? 0 : result;
+#endif
     }
     return result;
 }
@@ -94,7 +93,11 @@ mpc_command mpc_realise(const mpc_state *state)
     int32_t is_found = 0;
     for (int32_t k = first; k < MPC_SHORT; k++) {
         const mpc_real share = state->old_on_share[k];
+#if MPC_COSTATE
+        const mpc_real least = threshold;
+#else
         const mpc_real least = (k == first) ? real_min(threshold, STAY_SHARE) : threshold;
+#endif
         if ((on != 0) && (is_found == 0) && (share >= least)) {
             command.p_eng_w = state->old_p_eng_w[k] / real_min(share, REAL(1.0));
             is_found = 1;

@@ -27,6 +27,7 @@ def engine_runs(
     vehicle: Vehicle,
     least_w: float = 0.0,
     fast_s: int | None = None,
+    stay_share: float = STAY_SHARE,
 ) -> bool:
     """Return whether the engine is to run in the coming second.
 
@@ -38,7 +39,7 @@ def engine_runs(
       is no nearer than b seconds, or if the battery alone cannot drive, the ramp asks for it or
       the car is too fast
     - it is stopped only if that mean is 1/2 at most and the car is not too fast within b seconds
-    - where a start costs something it is not stopped while sigma_0 >= `STAY_SHARE` and at least
+    - where a start costs something it is not stopped while sigma_0 >= `stay_share` and at least
       `STAY_S` seconds are left of the run, in the mean of what the relaxed plan mixes:
       sum_k min(sigma_0, .., sigma_k), up to arrival
 
@@ -50,6 +51,7 @@ def engine_runs(
     vehicle : gives b
     least_w : engine power that the ramp asks for now, see `qpmpc.controllers.ramp`
     fast_s : seconds until the first that is too fast for an engine that is off; None without one
+    stay_share : share from which on a run may go on
     """
     engine = vehicle.engine
     wish = bool(on_share[0] >= ON_THRESHOLD or least_w > 0.0 or too_fast(vehicle, seen.speed_mps))
@@ -61,21 +63,25 @@ def engine_runs(
     mean = float(ahead.sum()) / len(ahead)
     if not wish:
         soon_fast = fast_s is not None and 0 <= fast_s < bound_s
-        return mean > ON_THRESHOLD or soon_fast or _stays(on_share[: max(left_s, 0)], vehicle)
+        return (
+            mean > ON_THRESHOLD
+            or soon_fast
+            or _stays(on_share[: max(left_s, 0)], vehicle, stay_share)
+        )
     net_w = seen.demand_w + vehicle.battery.aux_power_w
     must = least_w > 0.0 or must_run(vehicle, net_w, seen.speed_mps)
     arrives = arrival_s is not None and arrival_s < bound_s
     return must or (mean >= ON_THRESHOLD and not arrives)
 
 
-def _stays(on_share: NDArray[np.float64], vehicle: Vehicle) -> bool:
+def _stays(on_share: NDArray[np.float64], vehicle: Vehicle, stay_share: float) -> bool:
     """Whether a run goes on although its share is below `ON_THRESHOLD`.
 
     The part of it that goes on in second k is the least share up to then: only a start makes the
     share rise. To stop throws all of it away, and what is missing takes another start.
     """
     engine = vehicle.engine
-    if not table_of(engine).has_start or len(on_share) == 0 or on_share[0] < STAY_SHARE:
+    if not table_of(engine).has_start or len(on_share) == 0 or on_share[0] < stay_share:
         return False
     left_s = np.minimum.accumulate(np.maximum(on_share, 0.0)).sum()
     return bool(left_s >= STAY_S)
@@ -91,8 +97,8 @@ def power_while_on_w(
     return power
 
 
-def second_of_power(on_share: NDArray[np.float64]) -> int:
+def second_of_power(on_share: NDArray[np.float64], stay_share: float = STAY_SHARE) -> int:
     """Second whose power an engine that is to run gets: the first that the plan runs it in."""
-    if on_share[0] >= STAY_SHARE:
+    if on_share[0] >= stay_share:
         return 0
     return int(np.argmax(on_share >= ON_THRESHOLD))

@@ -17,7 +17,7 @@ from qpmpc.controllers.base import (
     base_not_called,
 )
 from qpmpc.controllers.monitor import NOTHING_WRONG, Flag
-from qpmpc.controllers.realise import engine_runs, power_while_on_w, second_of_power
+from qpmpc.controllers.realise import STAY_SHARE, engine_runs, power_while_on_w, second_of_power
 from qpmpc.controllers.rule_based import RuleBased, last_rung
 from qpmpc.controllers.settings import SettingsLike
 from qpmpc.errors import QpmpcError
@@ -45,6 +45,8 @@ class Plan:
     least_w : engine power that the first second needs at least, see `qpmpc.controllers.ramp`
     certificate_g : cost of the plan less a proven lower bound on that of any; nan without one
     fast_s : first second of the plan that is too fast for an engine that is off; None without one
+    stay_share : share from which on a run may go on, see `qpmpc.controllers.realise`; that of a
+        start for shares in which not only a start lets one rise
     """
 
     on_share: NDArray[np.float64]
@@ -58,6 +60,7 @@ class Plan:
     least_w: float = 0.0
     certificate_g: float = float("nan")
     fast_s: int | None = None
+    stay_share: float = STAY_SHARE
 
     @classmethod
     def of_means(
@@ -190,9 +193,10 @@ class RecedingHorizon(Controller):
         arrival_s = None if plan.arrival_s is None else plan.arrival_s - second
         fast_s = None if plan.fast_s is None else plan.fast_s - second
         least_w = plan.least_w if second == 0 else 0.0
-        if not engine_runs(ahead, arrival_s, seen, self.trip.vehicle, least_w, fast_s):
+        vehicle, stay_share = self.trip.vehicle, plan.stay_share
+        if not engine_runs(ahead, arrival_s, seen, vehicle, least_w, fast_s, stay_share):
             return Command(False, 0.0)
-        running_w = float(plan.power_on_w[second + second_of_power(ahead)])
+        running_w = float(plan.power_on_w[second + second_of_power(ahead, stay_share)])
         return Command(True, max(running_w, least_w))
 
     def _checked(self, plan: Plan, second: int) -> Plan:

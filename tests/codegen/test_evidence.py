@@ -113,6 +113,7 @@ def test_misra_findings_are_the_deviations_explained(project) -> None:
         "cppcheck",
         "--std=c99",
         "--addon=misra",
+        "-DMPC_NATIVE_MINMAX",  # as for the target, and no other configuration: minutes less
         "--enable=style,warning,performance,portability",
         "--suppress=missingIncludeSystem",
         "--quiet",

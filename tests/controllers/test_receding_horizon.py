@@ -207,9 +207,10 @@ def test_a_planner_whose_init_forgot_its_base_says_so() -> None:
             make()
 
 
-def test_on_from_one_half_up_at_the_mean_over_the_share() -> None:
-    plan = Plan.of_means([0.0, 0.49, 0.5, 0.8, 1.0, 1.001], [0.0, 4e3, 4e3, 8e3, 9e3, 9e3])
-    np.testing.assert_allclose(plan.power_on_w, [0.0, 0.0, 8e3, 10e3, 9e3, 9e3])
+def test_power_is_the_mean_over_the_share_where_an_engine_may_run() -> None:
+    """Started from a share of one half on; one that runs may go on from 0.35 on."""
+    plan = Plan.of_means([0.34, 0.4, 0.5, 0.8, 1.0, 1.001], [4e3, 4e3, 4e3, 8e3, 9e3, 9e3])
+    np.testing.assert_allclose(plan.power_on_w, [0.0, 10e3, 8e3, 10e3, 9e3, 9e3])
     assert plan.usable
     assert not Plan.none().usable
 

@@ -266,7 +266,7 @@ MUTATIONS = [
     ),
     Mutation(
         "engine on whatever the share", RecedingHorizon, "_realised",
-        "if not engine_runs(ahead, arrival_s, seen, self.trip.vehicle, least_w, fast_s):",
+        "if not engine_runs(ahead, arrival_s, seen, vehicle, least_w, fast_s, stay_share):",
         "if False:",
         (limits_kept, bound_below_everything, relaxation_tight),
         also=Replacement(
