@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from qpmpc.controllers.cvxpy_terms import checked_terms
 from qpmpc.controllers.ramp import RampFloor
+from qpmpc.controllers.realise import STAY_SHARE
 from qpmpc.controllers.receding_horizon import Plan, Planner
 from qpmpc.controllers.settings import SettingsLike
 from qpmpc.errors import InputError, QpmpcError
@@ -127,4 +128,5 @@ class CvxpyPlanner(Planner):
         arrival_s = stages.arrival_s(layout.short_stages)
         least_w = self._ramp.least_w(stages.seconds_w(layout.short_stages), seen.soc)
         fast_s = stages.fast_s(layout.short_stages, self.trip.vehicle)
-        return Plan.of_means(x[short, Var.ON], x[short, Var.P_ENG], arrival_s, least_w, fast_s)
+        on_share, p_eng_w = x[short, Var.ON], x[short, Var.P_ENG]
+        return Plan.of_means(on_share, p_eng_w, arrival_s, least_w, fast_s, STAY_SHARE)

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from qpmpc.controllers.ramp import RampFloor
-from qpmpc.controllers.realise import ON_THRESHOLD
 from qpmpc.controllers.receding_horizon import Plan, Planner
 from qpmpc.controllers.settings import SettingsLike
 from qpmpc.costate.certificate import Followed, Layout, choose, follow, violation_price_g
@@ -150,7 +149,6 @@ class MhCostate(Planner):
             least_w=self._ramp.least_w(solved.stages.seconds_w(short), seen.soc),
             certificate_g=solved.certificate_g,
             fast_s=solved.stages.fast_s(short, self.trip.vehicle),
-            stay_share=ON_THRESHOLD,  # of the smoothed dual, not of a relaxed program
         )
 
     def solve(self, seen: Observation) -> CostatePlan:

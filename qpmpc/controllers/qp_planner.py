@@ -194,6 +194,7 @@ class QpPlanner(Planner):
                 solved.stages, seen, solved.about, solved.x, solved.duals
             ),
             fast_s=solved.stages.fast_s(short.stop, self.trip.vehicle),
+            stay_share=STAY_SHARE,
         )
 
     def solve(self, seen: Observation) -> QpPlan:

@@ -15,7 +15,7 @@ from qpmpc.vehicle.must_run import must_run, too_fast
 from qpmpc.vehicle.parameters import Vehicle
 
 ON_THRESHOLD = 0.5  # share of a 1 s stage from which on the engine runs
-# A run goes on below it, where that spares a start; chosen in docs/studies/tuning.md.
+# A run of a relaxed plan goes on below it, which spares starts; chosen in docs/studies/tuning.md.
 STAY_SHARE = 0.35  # from this share on
 STAY_S = 2.0  # and if the plan has this much left of the run
 
@@ -27,7 +27,7 @@ def engine_runs(
     vehicle: Vehicle,
     least_w: float = 0.0,
     fast_s: int | None = None,
-    stay_share: float = STAY_SHARE,
+    stay_share: float = ON_THRESHOLD,
 ) -> bool:
     """Return whether the engine is to run in the coming second.
 
@@ -51,7 +51,7 @@ def engine_runs(
     vehicle : gives b
     least_w : engine power that the ramp asks for now, see `qpmpc.controllers.ramp`
     fast_s : seconds until the first that is too fast for an engine that is off; None without one
-    stay_share : share from which on a run may go on
+    stay_share : share from which on a run may go on; `STAY_SHARE` where only a start lets one rise
     """
     engine = vehicle.engine
     wish = bool(on_share[0] >= ON_THRESHOLD or least_w > 0.0 or too_fast(vehicle, seen.speed_mps))
@@ -97,7 +97,7 @@ def power_while_on_w(
     return power
 
 
-def second_of_power(on_share: NDArray[np.float64], stay_share: float = STAY_SHARE) -> int:
+def second_of_power(on_share: NDArray[np.float64], stay_share: float) -> int:
     """Second whose power an engine that is to run gets: the first that the plan runs it in."""
     if on_share[0] >= stay_share:
         return 0

@@ -17,7 +17,7 @@ from qpmpc.controllers.base import (
     base_not_called,
 )
 from qpmpc.controllers.monitor import NOTHING_WRONG, Flag
-from qpmpc.controllers.realise import STAY_SHARE, engine_runs, power_while_on_w, second_of_power
+from qpmpc.controllers.realise import ON_THRESHOLD, engine_runs, power_while_on_w, second_of_power
 from qpmpc.controllers.rule_based import RuleBased, last_rung
 from qpmpc.controllers.settings import SettingsLike
 from qpmpc.errors import QpmpcError
@@ -45,8 +45,8 @@ class Plan:
     least_w : engine power that the first second needs at least, see `qpmpc.controllers.ramp`
     certificate_g : cost of the plan less a proven lower bound on that of any; nan without one
     fast_s : first second of the plan that is too fast for an engine that is off; None without one
-    stay_share : share from which on a run may go on, see `qpmpc.controllers.realise`; that of a
-        start for shares in which not only a start lets one rise
+    stay_share : share from which on a run may go on, see `qpmpc.controllers.realise`: `STAY_SHARE`
+        for those of a relaxed program in which only a start lets one rise
     """
 
     on_share: NDArray[np.float64]
@@ -60,7 +60,7 @@ class Plan:
     least_w: float = 0.0
     certificate_g: float = float("nan")
     fast_s: int | None = None
-    stay_share: float = STAY_SHARE
+    stay_share: float = ON_THRESHOLD
 
     @classmethod
     def of_means(
@@ -70,11 +70,19 @@ class Plan:
         arrival_s: int | None = None,
         least_w: float = 0.0,
         fast_s: int | None = None,
+        stay_share: float = ON_THRESHOLD,
     ) -> "Plan":
         """Return the plan of mean engine powers E = sigma P_on; shape (n,) each."""
         share, mean_w = np.asarray(on_share, dtype=float), np.asarray(p_eng_w, dtype=float)
         power_on_w = power_while_on_w(share, mean_w)
-        return cls(share, power_on_w, arrival_s=arrival_s, least_w=least_w, fast_s=fast_s)
+        return cls(
+            share,
+            power_on_w,
+            arrival_s=arrival_s,
+            least_w=least_w,
+            fast_s=fast_s,
+            stay_share=stay_share,
+        )
 
     @classmethod
     def none(

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qpmpc.controllers.realise import engine_runs, power_while_on_w, second_of_power
+from qpmpc.controllers.realise import STAY_SHARE, engine_runs, power_while_on_w, second_of_power
 from qpmpc.simulation import simulate
 from qpmpc.trip import Observation
 from qpmpc.vehicle import load_vehicle
@@ -56,17 +56,20 @@ def test_a_change_needs_most_of_the_seconds_that_it_binds(on_share, arrival_s, s
 def test_a_run_goes_on_while_the_plan_has_two_seconds_left_of_it(on_share, arrival_s, runs):
     """A stop would throw them away, and the plan get them back by another start."""
     shares = np.array(on_share)
-    assert engine_runs(shares, arrival_s, ON, CAR) is runs
-    assert not engine_runs(shares, arrival_s, OFF, CAR)  # no start for them
-    assert not engine_runs(shares, arrival_s, ON, FREE)  # where a start costs nothing it stops
+    given = {"on_share": shares, "arrival_s": arrival_s, "stay_share": STAY_SHARE}
+    assert engine_runs(seen=ON, vehicle=CAR, **given) is runs
+    assert not engine_runs(seen=OFF, vehicle=CAR, **given)  # no start for them
+    assert not engine_runs(seen=ON, vehicle=FREE, **given)  # where a start costs nothing it stops
+    assert not engine_runs(shares, arrival_s, ON, CAR)  # shares that rise without a start
 
 
 def test_power_is_that_of_the_second_or_of_the_next_that_runs():
     share, mean_w = np.array([0.4, 0.3, 0.8, 1.0]), np.array([4e3, 3e3, 4e3, 9e3])
     power_w = power_while_on_w(share, mean_w)
     np.testing.assert_allclose(power_w, [10e3, 0.0, 5e3, 9e3])
-    assert second_of_power(share) == 0
-    assert second_of_power(share[1:]) == 1
+    assert second_of_power(share, STAY_SHARE) == 0
+    assert second_of_power(share[1:], STAY_SHARE) == 1
+    assert second_of_power(share, 0.5) == 2
 
 
 @pytest.mark.parametrize("seen", [ON, OFF])

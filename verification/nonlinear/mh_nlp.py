@@ -65,6 +65,7 @@ class MhNlp(Planner):
             arrival_s=arrival_s,
             least_w=least_w,
             fast_s=solved.stages.fast_s(self._short, self.trip.vehicle),
+            stay_share=STAY_SHARE,
         )
 
     def forget(self) -> None:
