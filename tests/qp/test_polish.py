@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from qpmpc import Trip
 from qpmpc.controllers.qp_planner import QpPlanner
-from qpmpc.controllers.realise import ON_THRESHOLD
+from qpmpc.controllers.realise import STAY_SHARE
 from qpmpc.controllers.settings import PAPER, BaselineMpcSettings, ControllerSettings
 from qpmpc.cycles import load_cycle
 from qpmpc.preview import HorizonSettings, StageBuilder, Trace
@@ -133,7 +133,7 @@ def test_the_planner_polishes_its_first_second_alone_and_only_if_told() -> None:
         np.testing.assert_array_equal(polished.on_share, planned.on_share)
         np.testing.assert_array_equal(polished.power_on_w[1:], planned.power_on_w[1:])
         differs = polished.power_on_w[0] != planned.power_on_w[0]
-        assert not differs or planned.on_share[0] >= ON_THRESHOLD
+        assert not differs or planned.on_share[0] >= STAY_SHARE
         differing += differs
     assert differing > 3
 
