@@ -28,7 +28,18 @@ static mpc_real mean_share(const mpc_state *state, int32_t first, int32_t second
     return sum / (mpc_real)count;
 }
 
-#if MPC_STARTS && !MPC_COSTATE /* shares of a smoothed dual rise without a start, too */
+/* Share from which on a run may go on; that of a start where the plan is no relaxed one: shares of a
+ * smoothed dual rise without a start, too. */
+static mpc_real stay_share(const mpc_state *state)
+{
+#if MPC_COSTATE
+    return state->cal.on_threshold;
+#else
+    return real_min(state->cal.on_threshold, STAY_SHARE);
+#endif
+}
+
+#if MPC_STARTS && !MPC_COSTATE
 /* Whether a run goes on although its share is below the threshold: the part of it that goes on is
  * the least share so far, because only a start makes the share of a relaxed plan rise. */
 static int32_t stays(const mpc_state *state, int32_t first)
@@ -39,7 +50,7 @@ static int32_t stays(const mpc_state *state, int32_t first)
         least = real_min(least, real_max(state->old_on_share[k], REAL(0.0)));
         left_s += (k < state->old_arrival_s) ? least : REAL(0.0);
     }
-    return ((state->old_on_share[first] >= STAY_SHARE) && (left_s >= STAY_S)) ? 1 : 0;
+    return ((state->old_on_share[first] >= stay_share(state)) && (left_s >= STAY_S)) ? 1 : 0;
 }
 #endif
 
@@ -93,11 +104,7 @@ mpc_command mpc_realise(const mpc_state *state)
     int32_t is_found = 0;
     for (int32_t k = first; k < MPC_SHORT; k++) {
         const mpc_real share = state->old_on_share[k];
-#if MPC_COSTATE
-        const mpc_real least = threshold;
-#else
-        const mpc_real least = (k == first) ? real_min(threshold, STAY_SHARE) : threshold;
-#endif
+        const mpc_real least = (k == first) ? stay_share(state) : threshold;
         if ((on != 0) && (is_found == 0) && (share >= least)) {
             command.p_eng_w = state->old_p_eng_w[k] / real_min(share, REAL(1.0));
             is_found = 1;
