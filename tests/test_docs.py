@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 import typer
-from caches import shared_cache
+from run_folder import shared_cache
 
 from qpmpc.cli import main
 from qpmpc.cli.app import app

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from caches import shared_cache
+from run_folder import shared_cache
 
 FOLDER = Path(__file__).parents[1] / "examples"
 SCRIPTS = sorted(file.name for file in FOLDER.glob("*.py"))

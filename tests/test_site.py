@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from caches import shared_cache
+from run_folder import shared_cache
 
 import qpmpc
 from qpmpc.cli.app import app

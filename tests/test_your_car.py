@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from caches import shared_cache
+from run_folder import shared_cache
 
 import qpmpc
 from qpmpc.cli import main

@@ -1,6 +1,5 @@
 """FMUs of controller and plant, exported once for all tests, in whichever process they run."""
 
-import os
 from pathlib import Path
 
 import pytest
@@ -13,6 +12,7 @@ from qpmpc.trip import Trip
 pytest.importorskip("fmpy", reason="not installed: fmpy, which simulates FMUs")
 
 from fmus import CONTROLLERS
+from run_folder import run_folder
 
 
 @pytest.fixture(scope="session")
@@ -43,7 +43,4 @@ class Exported(dict[str, Path]):
 def fmus(tmp_path_factory: pytest.TempPathFactory, trip: Trip) -> Exported:
     if compiler() is None:
         pytest.skip("no C compiler on this machine")
-    base = tmp_path_factory.getbasetemp()
-    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "fmus"
-    folder.mkdir(exist_ok=True)
-    return Exported(folder, trip)
+    return Exported(run_folder(tmp_path_factory, "fmus"), trip)
