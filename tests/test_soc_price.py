@@ -42,11 +42,11 @@ def test_a_study_uses_the_same_price(tmp_path):
     study = {
         "name": "price",
         "fixed": {"cycle": "nycc", "dp.grid": "quick"},
-        "grid": {"controller": ["mh-qp-paper", "dp"]},
+        "grid": {"controller": ["rule-based", "dp"]},
     }
-    mpc, dp = qpmpc.sweep(study, tmp_path / "out", workers=1).frame().itertuples()
-    missing = mpc.soc_end_target - mpc.soc_end
+    rules, dp = qpmpc.sweep(study, tmp_path / "out", workers=1).frame().itertuples()
+    missing = rules.soc_end_target - rules.soc_end
     assert abs(missing) > 1e-3  # else nothing was tested
-    fuel_g = mpc.fuel_g + dp.soc_price_g * missing
+    fuel_g = rules.fuel_g + dp.soc_price_g * missing
     dp_g = dp.fuel_g + dp.soc_price_g * (dp.soc_end_target - dp.soc_end)
-    assert mpc.fuel_above_dp_percent == pytest.approx(100.0 * (fuel_g / dp_g - 1.0))
+    assert rules.fuel_above_dp_percent == pytest.approx(100.0 * (fuel_g / dp_g - 1.0))

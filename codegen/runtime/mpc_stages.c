@@ -23,9 +23,17 @@ static void take_refill(mpc_state *state)
     }
 }
 
+/* For how many seconds a run of the engine that has begun has to go on. */
+static int32_t begun_s(const mpc_measured *good)
+{
+    return (good->engine_on != 0) ? (mpc_par.min_on_s - good->engine_for_s) : 0;
+}
+
 /* Preview to stages: seconds first, then the classes of each block; past stages are masked. */
 void mpc_stages_take(mpc_state *state, const mpc_in *in)
 {
+    const int32_t left_s = begun_s(&state->watch.good);
+    const int32_t held_s = (left_s < in->short_count) ? left_s : in->short_count;
     for (int32_t k = 0; k < MPC_SHORT; k++) {
         mpc_stage *const stage = &state->stage[k];
         const mpc_real seen = above((mpc_real)in->short_count, (mpc_real)k);
@@ -33,7 +41,9 @@ void mpc_stages_take(mpc_state *state, const mpc_in *in)
         stage->road.net_w = seen * battery_side_w(in->short_demand_w[k]);
         stage->road.speed_mps = seen * in->short_speed_mps[k];
         stage->road.internal_off_w = mpc_map_planned_internal_w(stage->road.net_w);
-        stage->road.must_share = (mpc_real)must_run(stage->road.net_w, stage->road.speed_mps);
+        const int32_t held = (k < held_s) ? 1 : 0;
+        const int32_t must = held | must_run(stage->road.net_w, stage->road.speed_mps);
+        stage->road.must_share = (mpc_real)must;
         stage->road.free_net_w = stage->road.net_w;
         stage->road.free_internal_off_w = stage->road.internal_off_w;
         stage->road.rises = seen;
@@ -64,6 +74,7 @@ void mpc_stages_take(mpc_state *state, const mpc_in *in)
 /* The last good preview, some seconds later: short stages move up and are masked at the end. */
 void mpc_stages_move_up(mpc_state *state, int32_t by)
 {
+    const int32_t left_s = begun_s(&state->watch.good);
     for (int32_t k = 0; k < MPC_SHORT; k++) {
         const int32_t from = k + by;
         mpc_stage_road *const road = &state->stage[k].road;
@@ -74,7 +85,9 @@ void mpc_stages_move_up(mpc_state *state, int32_t by)
         road->net_w = seen * later->net_w;
         road->speed_mps = seen * later->speed_mps;
         road->internal_off_w = seen * later->internal_off_w;
-        road->must_share = seen * later->must_share;
+        const int32_t held = ((k < left_s) && (road->duration_s > REAL(0.0))) ? 1 : 0;
+        const int32_t must = held | must_run(road->net_w, road->speed_mps);
+        road->must_share = (mpc_real)must;
         road->free_net_w = seen * later->free_net_w;
         road->free_internal_off_w = seen * later->free_internal_off_w;
         road->rises = seen * later->rises;

@@ -74,7 +74,7 @@ class CvxpyPlanner(Planner):
     def set_program(self, seen: Observation) -> Stages:
         """Set the program's own parameters for a second; returns its stages."""
         about = self._about or Linearisation.constant(self.preview.count, seen.t_cl_degc)
-        stages = self.preview.at(seen.step)
+        stages = self.preview.ahead(seen.step, seen.engine_on, seen.engine_for_s)
         self.program.update(stages, seen.soc, seen.t_cl_degc, about, seen.engine_on)
         return stages
 

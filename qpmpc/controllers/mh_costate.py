@@ -127,7 +127,7 @@ class MhCostate(Planner):
         """Solve the program of departure, with several linearisations."""
         self.forget()
         self.expects = None
-        stages = self.preview.at(seen.step)
+        stages = self.preview.ahead(seen.step, seen.engine_on, seen.engine_for_s)
         about, start = self._cold(seen.t_cl_degc)
         for _ in range(DEPARTURE_LINEARISATIONS):
             plan = self._solve(stages, seen, about, start, DEPARTURE_ROUNDS)
@@ -156,7 +156,7 @@ class MhCostate(Planner):
 
         Without one, as after a restart under way, from a guess: a round makes a usable plan of it.
         """
-        stages = self.preview.at(seen.step)
+        stages = self.preview.ahead(seen.step, seen.engine_on, seen.engine_for_s)
         about, start = self._cold(seen.t_cl_degc)
         if self.last is not None:
             x, charge, heat = self.last.x, self.last.at.charge, self.last.at.heat

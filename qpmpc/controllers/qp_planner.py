@@ -204,7 +204,8 @@ class QpPlanner(Planner):
         result leaves that solution in place; after several in a row it may be the cause, and the
         next step starts from cold.
         """
-        stages, t_cl_degc = self.preview.at(seen.step), seen.t_cl_degc
+        stages = self.preview.ahead(seen.step, seen.engine_on, seen.engine_for_s)
+        t_cl_degc = seen.t_cl_degc
         if self.last is None:
             about, start = Linearisation.constant(self.preview.count, t_cl_degc), None
         else:

@@ -13,6 +13,7 @@ from qpmpc.errors import QpmpcError
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.preview.stages import Preview, StageBuilder, Stages
 from qpmpc.vehicle.capability import Capability
+from qpmpc.vehicle.must_run import begun_s
 from qpmpc.vehicle.plant import Plant
 
 LONGEST_STAGE_S = 1e5
@@ -56,6 +57,7 @@ class CheckedPreview:
     ) -> None:
         self.source, self.was_bad = source, False
         self.receive = receive or source.preview
+        self._vehicle = plant.vehicle
         self._can = Capability.of(plant.vehicle, plant.line)
         self._last: Stages | None = None
         self._last_step = 0
@@ -100,6 +102,22 @@ class CheckedPreview:
         if self._last is None or not 0 <= passed < self.settings.short_stages:
             raise NoPreviewError(f"no plausible preview at {step} s")
         return _moved_up(self._last, passed, self.settings.short_stages)
+
+    def ahead(self, step: int, engine_on: bool, engine_for_s: int) -> Stages:
+        """Return the same; a run of the engine that has begun goes on for `engine.min_on_s`.
+
+        Parameters
+        ----------
+        step : as of `at`
+        engine_on, engine_for_s : whether the engine runs, and for how long it has
+
+        Raises
+        ------
+        NoPreviewError
+            As `at`.
+        """
+        left_s = begun_s(self._vehicle, engine_on, engine_for_s)
+        return self.at(step).running_on(min(left_s, self.settings.short_stages))
 
     def _is_possible(self, preview: Preview) -> bool:
         """Whether the car can drive it."""

@@ -1,6 +1,6 @@
 """From preview to stages: the data of the trip ahead that a QP needs, in fixed slots."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -70,6 +70,16 @@ class Stages:
             after_j = max(after_j - float(spent_j[end + 1 : following + 1].sum()), 0.0)
             found[end] = after_j
         return found
+
+    def running_on(self, seconds: int) -> "Stages":
+        """Return the stages with an engine that must run in the first `seconds` of 1 s.
+
+        Masked stages are as before.
+        """
+        if seconds <= 0:
+            return self
+        held = (np.arange(len(self.duration_s)) < seconds) & (self.duration_s > 0.0)
+        return replace(self, must_share=np.where(held, 1.0, self.must_share))
 
     def arrival_s(self, short_stages: int) -> int | None:
         """Seconds until arrival, None where that is beyond the first `short_stages` of 1 s."""

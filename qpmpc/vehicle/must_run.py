@@ -33,6 +33,16 @@ def too_fast(vehicle: Vehicle, speed_mps: Any) -> Any:
     return speed_mps > fastest_off_mps(vehicle)
 
 
+def begun_s(vehicle: Vehicle, engine_on: bool, engine_for_s: int) -> int:
+    """Return for how many seconds a run of the engine that has begun has to go on.
+
+    Parameters
+    ----------
+    engine_on, engine_for_s : whether it runs, and for how long it has
+    """
+    return max(vehicle.engine.min_on_s - engine_for_s, 0) if engine_on else 0
+
+
 @overload
 def must_run(vehicle: Vehicle, net_w: float, speed_mps: float) -> bool: ...
 @overload

@@ -69,7 +69,10 @@ def _program(loop: Loop, curves: Curves, step: int) -> StageProgram:
     running = step > 0 and bool(tr.engine_on[step - 1])
     state = (float(tr.soc[step]), float(tr.t_cl_degc[step]), running)
     about = expansion(loop.x(step - 1), loop.settings, state[1])
-    road = horizon(loop.trip.cycle, vehicle, loop.settings, step)
+    off = np.flatnonzero(~tr.engine_on[:step])
+    begun = step - 1 - (int(off[-1]) if len(off) else -1)
+    held_s = vehicle.engine.min_on_s - begun if running else 0
+    road = horizon(loop.trip.cycle, vehicle, loop.settings, step, held_s)
     return stage_program(vehicle, curves, loop.settings, road, state, about)
 
 

@@ -45,8 +45,12 @@ class Horizon:
     high_j: Floats
 
 
-def horizon(cycle: Cycle, vehicle: Vehicle, settings: MhQpSettings, step: int) -> Horizon:
+def horizon(
+    cycle: Cycle, vehicle: Vehicle, settings: MhQpSettings, step: int, held_s: int = 0
+) -> Horizon:
     """Stages at one time step, from the cycle, for an exact forecast.
+
+    For `held_s` of the coming seconds an engine that runs has to go on.
 
     The next N seconds one by one; then the rest of each block after those, split into hard, easy
     and braking seconds. On from the hard to the easy seconds of a block the engine stops, and
@@ -65,7 +69,8 @@ def horizon(cycle: Cycle, vehicle: Vehicle, settings: MhQpSettings, step: int) -
         if t >= steps:
             rows.append([0.0] * 10)
             continue
-        rows.append([1.0, net[t], speed[t], off[t], must[t], net[t], off[t], 1.0, 0.0, 0.0])
+        on = must[t] or t - step < held_s
+        rows.append([1.0, net[t], speed[t], off[t], on, net[t], off[t], 1.0, 0.0, 0.0])
     for block in range(grid.blocks):
         seconds = range(max(block * length, step + n), min((block + 1) * length, steps))
         classes: list[list[int]] = [[], [], []]

@@ -78,7 +78,7 @@ class MhNlp(Planner):
 
         If the warm start fails, the step is solved again from cold.
         """
-        stages = self.preview.at(seen.step)
+        stages = self.preview.ahead(seen.step, seen.engine_on, seen.engine_for_s)
         start = self._last
         if start is not None:
             for _ in range(seen.step - self._last_step):
