@@ -125,9 +125,9 @@ def compare(
     ----------
     cycles, controllers : one or several, each as `simulate` takes it
     vehicle, settings : as of `simulate`
-    plant : somebody else's that is driven in place of ours, by name: ``"fastsim"``. Controllers
-        then believe in a vehicle that is derived from it, with the engine of `vehicle` if one is
-        given; that name is also that of its own control
+    plant : somebody else's that is driven in place of ours, by name: ``"fastsim"``,
+        ``"fastsim-sonata"``. Controllers then believe in a vehicle that is derived from it, with
+        the engine of `vehicle` if one is given; that name is also that of its own control
     figures : your own, by name with unit: functions of a run, for every controller's; they are
         columns of table and report, and in the JSON
     next_job : called with the title of each run; returns the function that takes its progress

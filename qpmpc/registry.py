@@ -68,7 +68,10 @@ CHECKS = Names(
 # Each leads to a `ForeignCar`, whose own control has the same name among the controllers.
 PLANTS = Names(
     "plant",
-    {"fastsim": Shipped("qpmpc.verification.fastsim.car:FASTSIM", "fastsim", "fastsim")},
+    {
+        name: Shipped(f"qpmpc.verification.fastsim.car:{target}", "fastsim", "fastsim")
+        for name, target in (("fastsim", "FASTSIM"), ("fastsim-sonata", "FASTSIM_SONATA"))
+    },
 )
 TABLES = (CONTROLLERS, PLANNERS, SOLVERS, VEHICLES, CYCLES, CHECKS, PLANTS)
 
@@ -260,7 +263,8 @@ def reads(controller: str, key: str) -> bool:
     Controllers of somebody else's may read any of them.
     """
     if is_of_model(key):
-        return controller not in ("dp", "fastsim")  # the plant is known to one, the other's own
+        # the plant is known to one, the others' own
+        return controller != "dp" and controller not in PLANTS.shipped
     if controller not in _READS or key.partition(".")[0] in Vehicle.model_fields:
         return True
     return any(key == part or key.startswith(f"{part}.") for part in _READS[controller])
@@ -292,7 +296,7 @@ _READS = {
     "rule-based": ("rule_based",),
     "ecms": ("ecms", "rule_based"),
     "dp": ("dp",),
-    "fastsim": (),
+    **dict.fromkeys(PLANTS.shipped, ()),
 }
 _SCALARS = {"name", "description", "base"}
 

@@ -48,9 +48,9 @@ PlantOption = Annotated[
         "--plant",
         metavar="NAME",
         autocompletion=complete_plant,
-        help="Drive somebody else's plant in place of ours: fastsim, whose own control is then the "
-        "controller fastsim. Controllers believe in a car derived from it; --vehicle gives them "
-        "another engine's fuel.",
+        help="Drive somebody else's plant in place of ours: fastsim (a Prius) or fastsim-sonata (a "
+        "Sonata with its heat), whose own control is then the controller of that name. Controllers "
+        "believe in a car derived from it; --vehicle gives them another engine's fuel.",
         show_default=False,
     ),
 ]

@@ -95,7 +95,7 @@ def test_the_shell_completes_commands_and_names():
         ("sweep", "study", "weath", "weather"),
         ("studies", "name", "weath", "weather"),
         ("verify", "only", "bou", "bounds"),
-        ("compare", "plant", "f", "fastsim"),
+        ("compare", "plant", "fastsim-", "fastsim-sonata"),
         ("trips", "name", "ju", "judge"),
         ("simulate", "set_", "thermal.t_a", "thermal.t_amb_degc="),
         ("simulate", "set_", "mh_qp.admm.it", "mh_qp.admm.iterations="),

@@ -16,10 +16,10 @@ from qpmpc.cli import main
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.vehicle import Command, load_vehicle
 from qpmpc.vehicle.engine import optimal_line
-from qpmpc.verification.fastsim import one_second
 from qpmpc.verification.fastsim.believed import LINE_FROM, believed_vehicle, stored_w
 from qpmpc.verification.fastsim.car import FASTSIM
 from qpmpc.verification.fastsim.one_second import (
+    PRIUS,
     SecondBySecond,
     component,
     departing,
@@ -30,7 +30,7 @@ from qpmpc.verification.fastsim.one_second import (
 from qpmpc.verification.fastsim.plant import FastsimPlant
 
 ROOT = Path(__file__).parents[2]
-CAR = parameters()
+CAR = parameters(PRIUS)
 ENGINE_W = component(CAR, "fc")["pwr_out_max_watts"]
 RAMP_W = ENGINE_W / component(CAR, "fc")["pwr_ramp_lag_seconds"]
 STORE_J = component(CAR, "res")["energy_capacity_joules"]
@@ -39,7 +39,7 @@ NYCC = qpmpc.Trip("nycc", believed_vehicle())
 
 def whole_run(cycle: Cycle, soc: float) -> dict:
     """FASTSim's own run of a whole cycle, with its history."""
-    car = fastsim.Vehicle.from_dict(departing(shipped_car(), soc, float(cycle.speed_mps[0])))
+    car = fastsim.Vehicle.from_dict(departing(shipped_car(PRIUS), soc, float(cycle.speed_mps[0])))
     car.set_save_interval(1)
     allowed = {**fastsim.SimParams.default().to_dict(), "trace_miss_opts": "Allow"}
     road = fastsim.Cycle.from_dict(whole_road(cycle))
@@ -53,7 +53,7 @@ def whole_run(cycle: Cycle, soc: float) -> dict:
 def test_stepping_repeats_the_whole_run(name: str) -> None:
     cycle = load_cycle(name)
     whole = whole_run(cycle, 0.55)
-    car = SecondBySecond(0.55, float(cycle.speed_mps[0]))
+    car = SecondBySecond(PRIUS, 0.55, float(cycle.speed_mps[0]))
     states = [
         {part: component(now, part)["state"] for part in ("fc", "res", "vehicle")}
         for speed, grade in zip(cycle.speed_mps[1:], cycle.step_grade, strict=True)
@@ -75,7 +75,7 @@ def test_stepping_repeats_the_whole_run(name: str) -> None:
 def test_own_control_is_fastsims_balanced_run() -> None:
     cycle = load_cycle("nycc")
     drive = fastsim.SimDrive(
-        fastsim.Vehicle.from_resource(one_second.CAR), fastsim.Cycle.from_dict(whole_road(cycle))
+        fastsim.Vehicle.from_resource(PRIUS.file), fastsim.Cycle.from_dict(whole_road(cycle))
     )
     drive.run()
     result = drive.to_dict()["veh"]
@@ -115,7 +115,7 @@ def test_commands_that_can_be_obeyed_are_obeyed(seed: int) -> None:
 
 
 def test_what_is_not_obeyed_is_reported() -> None:
-    plant = FastsimPlant(NYCC, 0.6, obeys=True)
+    plant = FastsimPlant(PRIUS, NYCC, 0.6, obeys=True)
     state = plant.initial_state()
     seen = NYCC.start
     state, flows = plant.step(state, Command(True, 30e3), seen.demand_w, seen.speed_mps)
@@ -194,11 +194,15 @@ def test_a_map_that_is_learned_is_no_worse_than_rules_nor_than_the_right_one(mea
     assert run.fuel_soc_balanced_g < 1.005 * measured["hwfet", "mh-qp"].fuel_soc_balanced_g
 
 
+def documented() -> str:
+    """The table of this car in docs/fastsim.md."""
+    page = (ROOT / "docs" / "fastsim.md").read_text("utf-8")
+    return page.partition("<!-- fastsim: ")[2].partition("<!-- end of fastsim -->")[0]
+
+
 def test_docs_state_what_is_measured(measured) -> None:
     stated = re.findall(
-        r"^\| ([\w-]+) \| (fastsim|rule-based|mh-qp) \| ([\d.]+)",
-        (ROOT / "docs" / "fastsim.md").read_text("utf-8"),
-        re.M,
+        r"^\| ([\w-]+) \| (fastsim|rule-based|mh-qp) \| ([\d.]+)", documented(), re.M
     )
     assert len(stated) == 3 * 4
     for cycle, name, fuel_g in stated:
@@ -209,11 +213,10 @@ def test_docs_state_what_is_measured(measured) -> None:
 
 
 def test_readme_states_what_the_page_does() -> None:
-    page = (ROOT / "docs" / "fastsim.md").read_text("utf-8")
     stated = {
         (cycle, label): (fuel, percent)
         for cycle, label, fuel, percent in re.findall(
-            r"^\| ([\w-]+) \| ([^|]+) \| ([\d.]+)(?:\\\*)? \| ([\d.-]+) \|", page, re.M
+            r"^\| ([\w-]+) \| ([^|]+) \| ([\d.]+)(?:\\\*)? \| ([\d.-]+) \|", documented(), re.M
         )
     }
     labels = {
@@ -257,7 +260,7 @@ def test_compare_writes_the_account(tmp_path: Path) -> None:
     [
         (["--plant", "fastsim", "--set", "thermal.t_amb_degc=3"], "thermal.t_amb_degc has no eff"),
         (["--plant", "fastsim", "--set", "trip.soc_init=0.99"], "trip.soc_init"),
-        (["--plant", "nothing"], "unknown plant 'nothing': use one of fastsim"),
+        (["--plant", "nothing"], "unknown plant 'nothing': use one of fastsim, fastsim-sonata"),
         (["--controllers", "fastsim"], "compare .. --plant fastsim"),
         (["--plant", "fastsim", "--controllers", "fastsim,fastsim"], "named twice"),
         (["--plant", "fastsim", "--vehicle", "nothing"], "unknown vehicle 'nothing'"),

@@ -1,4 +1,4 @@
-"""FASTSim's Prius in the terms of `qpmpc.Vehicle`: what controllers believe of it.
+"""A car of FASTSim in the terms of `qpmpc.Vehicle`: what controllers believe of it.
 
 All of it is computed from FASTSim's own vehicle, at run time.
 """
@@ -11,7 +11,10 @@ from qpmpc.settings import validated
 from qpmpc.vehicle import Vehicle, load_vehicle
 from qpmpc.vehicle.engine_parameters import LINE, LINE_TOO, MAP
 from qpmpc.vehicle.section import SPEED_MAX_MPS
+from qpmpc.verification.fastsim.heat import heat_of
 from qpmpc.verification.fastsim.one_second import (
+    PRIUS,
+    Model,
     SecondBySecond,
     Tree,
     best_power_w,
@@ -21,10 +24,6 @@ from qpmpc.verification.fastsim.one_second import (
 
 Floats = NDArray[np.float64]
 
-NAME = "prius-fastsim"
-T_CL_DEGC = 88.0  # FASTSim's Prius has no coolant: it is always this warm
-HEAT_CAPACITY_J_PER_K = 1e9  # so much that it stays
-T_AMB_DEGC = 20.0
 OPEN_CIRCUIT_V = 200.0  # any: FASTSim's battery has energy and efficiency, but no voltage
 # Between these points of FASTSim's efficiency curve fuel bends: so many lines each.
 LINES = 12
@@ -32,41 +31,40 @@ LINES = 12
 LINE_FROM = 0.015  # of the greatest power
 SAMPLES = 200
 POWER_SHARE_MAX = 0.9  # of the most that a battery with this resistance can give
-PROBED_MPS = (20.0, 21.0)  # speeds of the second in which FASTSim's road load is read
+PROBED_MPS = (20.0, 20.5)  # speeds of the second in which FASTSim's road load is read
 
 
-def believed_vehicle(engine_of: Vehicle | None = None) -> Vehicle:
-    """Return FASTSim's Prius as controllers are to see it.
+def believed_vehicle(
+    engine_of: Vehicle | None = None, model: Model = PRIUS, t_amb_degc: float | None = None
+) -> Vehicle:
+    """Return a car of FASTSim as controllers are to see it.
 
     What cannot be expressed is fitted: the losses of motor and battery together become the
     resistances of a battery, by least squares over +-`best_power_w` (`_resistances_ohm`); the
-    engine's line goes on straight below `LINE_FROM`. There is no start cost, as in FASTSim; once
-    started the engine runs as long as FASTSim's own control lets it.
+    engine's line goes on straight below `LINE_FROM`; for heat see `heat_of`. There is no start
+    cost, as in FASTSim; once started the engine runs as long as FASTSim's own control lets it.
 
     Parameters
     ----------
     engine_of : the car that gives the engine's fuel; FASTSim's own efficiency curve if None
+    model : which car
+    t_amb_degc : of the air; None for that of `heat_of`, and where the car has no heat
     """
-    car = parameters()
+    car = parameters(model)
     engine, motor, battery = (component(car, name) for name in ("fc", "em", "res"))
     base = (load_vehicle() if engine_of is None else engine_of).model_dump()
     aux_w = float(car["pwr_aux_base_watts"])
     discharge_ohm, charge_ohm = _resistances_ohm(car)
+    heat = heat_of(model, t_amb_degc)
     content = {
-        "name": NAME if engine_of is None else f"{NAME}-with-{engine_of.name}"[:64],
+        "name": model.believed
+        + ("" if engine_of is None else f"-with-{engine_of.name}")[: 64 - len(model.believed)],
         "description": f"FASTSim's {car['name']} as controllers believe it to be, engine of "
         + ("FASTSim" if engine_of is None else engine_of.name),
-        "chassis": _chassis(car),
-        "engine": base["engine"] | ({} if engine_of else _line(car, base["engine"])),
-        "cold_engine": base["cold_engine"] | {"k": 0.0},
-        "thermal": base["thermal"]
-        | {
-            "heat_capacity_j_per_k": HEAT_CAPACITY_J_PER_K,
-            "t_amb_degc": T_AMB_DEGC,
-            "cabin_heat_w": 0.0,
-            "t_cl_min_degc": T_CL_DEGC - 20.0,
-            "t_cl_max_degc": T_CL_DEGC + 20.0,
-        },
+        "chassis": _chassis(model, car),
+        "engine": base["engine"],
+        "cold_engine": base["cold_engine"] | heat.cold_engine,
+        "thermal": base["thermal"] | heat.thermal,
         "battery": {
             "capacity_ah": battery["energy_capacity_joules"] / 3600.0 / OPEN_CIRCUIT_V,
             "soc_grid": (0.0, 1.0),
@@ -85,13 +83,18 @@ def believed_vehicle(engine_of: Vehicle | None = None) -> Vehicle:
         "trip": {
             # where FASTSim's `run` starts
             "soc_init": 0.5 * (battery["min_soc"] + battery["max_soc"]),
-            "t_cl_init_degc": T_CL_DEGC,
-            "eta_eq": _eta_eq(car),
+            "t_cl_init_degc": heat.t_cl_init_degc,
+            "eta_eq": _eta_eq(car, heat.hot_share),
         },
     }
     ramp_w_per_s = engine["pwr_out_max_watts"] / engine["pwr_ramp_lag_seconds"]
+    power_max_w = engine["pwr_out_max_watts"]
+    if engine_of is None:
+        content["engine"] |= _line(car, base["engine"], heat.hot_share)
+    else:
+        power_max_w = min(power_max_w, base["engine"]["power_max_w"])
     content["engine"] |= {
-        "power_max_w": min(engine["pwr_out_max_watts"], content["engine"]["power_max_w"]),
+        "power_max_w": power_max_w,
         "ramp_w_per_s": ramp_w_per_s,
         "start_fuel_g": 0.0,
         "start_energy_j": 0.0,
@@ -99,15 +102,17 @@ def believed_vehicle(engine_of: Vehicle | None = None) -> Vehicle:
         "min_off_s": 0,
         "electric_max_mps": SPEED_MAX_MPS,  # FASTSim has no such limit
     }
-    return validated(Vehicle, content, f"the plant fastsim, with the engine of {base['name']}")
+    return validated(
+        Vehicle, content, f"the plant {model.plant}, with the engine of {base['name']}"
+    )
 
 
-def _chassis(car: Tree) -> Tree:
+def _chassis(model: Model, car: Tree) -> Tree:
     """Road load of FASTSim, read in a second that it drives."""
     before_mps, after_mps = PROBED_MPS
     middle_mps = 0.5 * (before_mps + after_mps)
     battery = component(car, "res")
-    probe = SecondBySecond(0.5 * (battery["min_soc"] + battery["max_soc"]), before_mps)
+    probe = SecondBySecond(model, 0.5 * (battery["min_soc"] + battery["max_soc"]), before_mps)
     power_w = probe.drive(after_mps, 0.0, None)["state"]
     inertia_w = power_w["pwr_accel_watts"] + power_w["pwr_whl_inertia_watts"]
     mass_kg, eta = car["mass_kilograms"], component(car, "transmission")["eff_interp"]
@@ -122,15 +127,16 @@ def _chassis(car: Tree) -> Tree:
     }
 
 
-def _line(car: Tree, engine: Tree) -> Tree:
-    """Fuel of the engine from FASTSim's efficiency curve, P / (eta(P) LHV)."""
+def _line(car: Tree, engine: Tree, hot_share: float) -> Tree:
+    """Fuel of the hot engine from FASTSim's efficiency curve, P / (eta(P) LHV)."""
     curve = component(car, "fc")["eff_interp_from_pwr_out"]["data"]
     most_w = component(car, "fc")["pwr_out_max_watts"]
     grid = np.array(curve["grid"][0])
     ends = grid[grid >= LINE_FROM]
     steps = np.arange(len(ends), step=1.0 / LINES)
     share = np.interp(steps[steps <= len(ends) - 1], np.arange(len(ends)), ends)
-    fuel = share * most_w / np.interp(share, grid, curve["values"]) / engine["lhv_j_per_kg"] * 1e3
+    efficiency = np.interp(share, grid, curve["values"]) * hot_share
+    fuel = share * most_w / efficiency / engine["lhv_j_per_kg"] * 1e3
     power = share * most_w
     idle = fuel[0] - power[0] * (fuel[1] - fuel[0]) / (power[1] - power[0])
     return {
@@ -145,16 +151,28 @@ def stored_w(car: Tree, net_w: Floats) -> Floats:
     """Power that FASTSim draws from the battery's store where the road and aux ask for net_w.
 
     The motor has the efficiency of its curve in driving and, as FASTSim has it, that of no power
-    in charging; the battery a constant one.
+    in charging; the battery a constant one, or one by hourly rate, then at its coldest.
     """
-    motor, battery = component(car, "em"), component(car, "res")
-    curve, eta = motor["eff_interp_achieved"]["data"], battery["eff_interp"]["Constant"]
+    motor = component(car, "em")
+    curve = motor["eff_interp_achieved"]["data"]
     aux_w = car["pwr_aux_base_watts"]
     shaft_w = net_w - aux_w
     share = np.maximum(shaft_w, 0.0) / motor["pwr_out_max_watts"]
     motor_eta = np.interp(share, curve["grid"][0], curve["values"])
     electric_w = np.where(shaft_w > 0.0, shaft_w / motor_eta, shaft_w * motor_eta) + aux_w
+    eta = _battery_eta(component(car, "res"), electric_w)
     return np.asarray(np.where(electric_w > 0.0, electric_w / eta, electric_w * eta))
+
+
+def _battery_eta(battery: Tree, electric_w: Floats) -> Floats:
+    """Efficiency of a battery, which in FASTSim is the same there and back at one rate."""
+    model = battery["eff_interp"]
+    if "Constant" in model:
+        return np.full_like(electric_w, model["Constant"])
+    data = model["CRateTemperature"]["data"]
+    coldest = np.reshape(data["values"], (len(data["grid"][0]), -1))[:, 0]
+    per_hour = electric_w * 3600.0 / battery["energy_capacity_joules"]
+    return np.asarray(np.interp(per_hour, data["grid"][0], coldest))
 
 
 def _resistances_ohm(car: Tree) -> tuple[float, float]:
@@ -179,8 +197,10 @@ def _resistances_ohm(car: Tree) -> tuple[float, float]:
     return found[0], found[1]
 
 
-def _eta_eq(car: Tree) -> float:
-    """Share of the fuel's energy that reaches the store from the engine at its best."""
+def _eta_eq(car: Tree, hot_share: float) -> float:
+    """Share of the fuel's energy that reaches the store from the hot engine at its best."""
     engine = component(car, "fc")["eff_interp_from_pwr_out"]["data"]["values"]
     charging = component(car, "em")["eff_interp_achieved"]["data"]["values"][0]
-    return float(max(engine) * charging * component(car, "res")["eff_interp"]["Constant"])
+    electric_w = np.array(-best_power_w(car) * charging)
+    kept = _battery_eta(component(car, "res"), electric_w)
+    return float(max(engine) * hot_share * charging * kept)

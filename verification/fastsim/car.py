@@ -1,4 +1,4 @@
-"""FASTSim's Prius as a foreign car: ``--plant fastsim``."""
+"""Cars of FASTSim as foreign ones: ``--plant fastsim``, ``--plant fastsim-sonata``."""
 
 from collections.abc import Mapping
 from importlib.metadata import version
@@ -8,17 +8,29 @@ from qpmpc.controllers.settings import SettingsLike
 from qpmpc.errors import InputError
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle import Command, Vehicle
-from qpmpc.verification.fastsim.believed import T_CL_DEGC, believed_vehicle
+from qpmpc.verification.fastsim.believed import believed_vehicle
+from qpmpc.verification.fastsim.heat import T_CL_DEGC
 from qpmpc.verification.fastsim.one_second import (
+    PRIUS,
+    SONATA,
+    Model,
     component,
     departing,
     driven,
     shipped_car,
     whole_road,
 )
-from qpmpc.verification.fastsim.plant import FastsimPlant
+from qpmpc.verification.fastsim.plant import FastsimPlant, conditions
 
 ALLOWED = ("engine.", "trip.soc_init", "trip.eta_eq", "battery.soc_min", "battery.soc_max")
+# of a heated car besides
+ALLOWED_HEAT = (
+    "cold_engine.",
+    "thermal.t_amb_degc",
+    "thermal.t_cl_min_degc",
+    "thermal.t_cl_max_degc",
+    "trip.t_cl_init_degc",
+)
 ROUNDS = 5  # of balancing SOC, as many as FASTSim's `run` allows
 
 
@@ -30,31 +42,35 @@ class OwnControl(Controller):
     fuel's energy.
     """
 
-    name = "fastsim"
     implementation = "rust"
     has_monitor = has_safety_layer = True
     decides_online = False
 
-    def __init__(self, trip: Trip, settings: SettingsLike | None = None) -> None:
+    def __init__(
+        self, trip: Trip, settings: SettingsLike | None = None, model: Model = PRIUS
+    ) -> None:
+        self.name = model.plant
         super().__init__(trip, settings)
-        car, road = shipped_car(), whole_road(trip.cycle)
+        car, around = shipped_car(model), conditions(model, trip.vehicle)
+        road = whole_road(trip.cycle, *around[1:])
         limit = component(car, "sim_params")["res_per_fuel_lim"]
         self.soc_init = trip.vehicle.trip.soc_init
         for _ in range(ROUNDS):
-            end = driven(departing(car, self.soc_init, float(trip.cycle.speed_mps[0])), road)
+            speed_mps = float(trip.cycle.speed_mps[0])
+            end = driven(departing(car, self.soc_init, speed_mps, *around[:1]), road)
             battery, engine = component(end, "res")["state"], component(end, "fc")["state"]
             given_j, burnt_j = battery["energy_out_chemical_joules"], engine["energy_fuel_joules"]
             if abs(given_j) < limit * burnt_j:
                 self.remarks.append(
-                    f"fastsim on {trip.cycle.name}: departs at SOC {self.soc_init:.4g}, found in "
-                    f"rounds until it arrives at it: the battery gives less than {limit:.1%} of "
+                    f"{self.name} on {trip.cycle.name}: departs at SOC {self.soc_init:.4g}, found "
+                    f"in rounds until it arrives at it: the battery gives less than {limit:.1%} of "
                     "the fuel's energy"
                 )
                 return
             self.soc_init = float(battery["soc"])
         self.remarks.append(
-            f"fastsim on {trip.cycle.name}: departs at SOC {self.soc_init:.4g}, found in {ROUNDS} "
-            "rounds, but does not arrive at it"
+            f"{self.name} on {trip.cycle.name}: departs at SOC {self.soc_init:.4g}, found in "
+            f"{ROUNDS} rounds, but does not arrive at it"
         )
 
     def step(self, seen: Observation) -> Command:
@@ -63,36 +79,54 @@ class OwnControl(Controller):
 
 
 class Fastsim:
-    """FASTSim's 2016 Prius Two, driven second by second."""
+    """A car of FASTSim, driven second by second.
 
-    name = OwnControl.name
+    Parameters
+    ----------
+    model : which
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.name = model.plant
 
     def vehicle(self, engine_of: Vehicle | None, settings: Mapping[str, object]) -> Vehicle:
         """Return what controllers believe; see `ForeignCar` and `believed_vehicle`."""
-        idle = [key for key in settings if not key.startswith(ALLOWED)]
+        allowed = ALLOWED + (ALLOWED_HEAT if self.model.heated else ())
+        idle = [key for key in settings if not key.startswith(allowed)]
         if idle:
             raise InputError(
-                f"--plant fastsim: {', '.join(idle)} {'has' if len(idle) == 1 else 'have'} no "
+                f"--plant {self.name}: {', '.join(idle)} {'has' if len(idle) == 1 else 'have'} no "
                 "effect, road, battery and coolant are FASTSim's: what controllers believe can be "
-                f"set by {', '.join(key + '*' if key.endswith('.') else key for key in ALLOWED)}"
+                f"set by {', '.join(key + '*' if key.endswith('.') else key for key in allowed)}"
             )
-        return believed_vehicle(engine_of).with_settings(dict(settings))
+        believed = believed_vehicle(engine_of, self.model).with_settings(dict(settings))
+        if not self.model.heated:
+            return believed
+        # what the cabin asks for, and with it the belief, depends on it
+        t_amb_degc = believed.thermal.t_amb_degc
+        return believed_vehicle(engine_of, self.model, t_amb_degc).with_settings(dict(settings))
 
     def own_control(self, trip: Trip) -> Controller:
         """Return FASTSim's own control."""
-        return OwnControl(trip)
+        return OwnControl(trip, model=self.model)
 
     def plant(self, trip: Trip, controller: Controller) -> FastsimPlant:
-        """Return FASTSim's Prius for one run."""
+        """Return the car for one run."""
         if isinstance(controller, OwnControl):
-            return FastsimPlant(trip, controller.soc_init, obeys=False)
-        return FastsimPlant(trip, trip.vehicle.trip.soc_init, obeys=True)
+            return FastsimPlant(self.model, trip, controller.soc_init, obeys=False)
+        return FastsimPlant(self.model, trip, trip.vehicle.trip.soc_init, obeys=True)
 
     def remarks(self, vehicle: Vehicle) -> list[str]:
         """Return what every run on this plant rests on."""
+        heat = (
+            f"Air of {vehicle.thermal.t_amb_degc:g} °C; cabin and battery depart at FASTSim's 22 °C"
+            if self.model.heated
+            else f"No coolant: {T_CL_DEGC:g} °C throughout"
+        )
         said = [
-            f"plant: the 2016 Prius Two of FASTSim {version('fastsim')}; {vehicle.name} is what "
-            f"controllers believe. No coolant: {T_CL_DEGC:g} °C throughout. Fuel in g of "
+            f"plant: the {self.model.car} of FASTSim {version('fastsim')}; {vehicle.name} is what "
+            f"controllers believe. {heat}. Fuel in g of "
             f"{vehicle.engine.lhv_j_per_kg / 1e6:g} MJ/kg",
             "what final SOC differs from the initial one is priced at an efficiency of "
             f"{vehicle.trip.eta_eq:.3g} (trip.eta_eq)",
@@ -102,4 +136,5 @@ class Fastsim:
         return said
 
 
-FASTSIM = Fastsim()
+FASTSIM = Fastsim(PRIUS)
+FASTSIM_SONATA = Fastsim(SONATA)

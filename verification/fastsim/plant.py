@@ -1,29 +1,44 @@
-"""FASTSim's Prius on one trip, with the interface of our own plant."""
+"""A car of FASTSim on one trip, with the interface of our own plant."""
 
+from statistics import fmean
 from typing import Any
 
 import numpy as np
 
 from qpmpc.trip import Trip
-from qpmpc.vehicle import Command, PlantState, StepFlows
+from qpmpc.vehicle import Command, PlantState, StepFlows, Vehicle
 from qpmpc.vehicle.plant import LONG_AGO_S, POWER_TOLERANCE_W
-from qpmpc.verification.fastsim.one_second import SecondBySecond, Tree, component
+from qpmpc.verification.fastsim.one_second import (
+    ZERO_DEGC_K,
+    Model,
+    SecondBySecond,
+    Tree,
+    component,
+)
+
+
+def conditions(model: Model, vehicle: Vehicle) -> tuple[float, float] | tuple[()]:
+    """Temperatures of engine at departure and air, of a heated car."""
+    return (vehicle.trip.t_cl_init_degc, vehicle.thermal.t_amb_degc) if model.heated else ()
 
 
 class FastsimPlant:
-    """FASTSim's Prius, driven second by second along a trip.
+    """A car of FASTSim, driven second by second along a trip.
 
     Parameters
     ----------
+    model : which car
     trip : its cycle is driven
     soc_init : at departure
     obeys : whether commands are carried out, or FASTSim's own control drives
     """
 
-    def __init__(self, trip: Trip, soc_init: float, obeys: bool) -> None:
+    def __init__(self, model: Model, trip: Trip, soc_init: float, obeys: bool) -> None:
         self._cycle, self._vehicle = trip.cycle, trip.vehicle
-        self._soc_init, self._obeys = soc_init, obeys
-        self._car = SecondBySecond(soc_init, float(trip.cycle.speed_mps[0]))
+        self._soc_init, self._obeys, self._model = soc_init, obeys, model
+        self._car = SecondBySecond(
+            model, soc_init, float(trip.cycle.speed_mps[0]), *conditions(model, trip.vehicle)
+        )
         self._seconds = 0
         self._eta_regen = trip.vehicle.chassis.eta_regen
         # of each second
@@ -32,6 +47,7 @@ class FastsimPlant:
         self._missing_w: list[float] = []
         self._beside_mps: list[float] = []
         self._demand_off_w: list[float] = []
+        self._cabin_degc: list[float] = []
 
     def initial_state(self) -> PlantState:
         """Return the state at departure, engine off."""
@@ -43,7 +59,8 @@ class FastsimPlant:
         """Drive the next second of the trip in FASTSim.
 
         FASTSim computes the road load and knows the speed: `demand_w` is compared with its own.
-        Flows of heat are 0: it has none.
+        Flows of heat are FASTSim's: what leaves by an open thermostat is part of `air_w`, and fuel
+        warms the coolant in the second after. They are 0 for a car without heat.
 
         Parameters
         ----------
@@ -61,9 +78,10 @@ class FastsimPlant:
         off_w = abs(p_eng_w - command.p_eng_w) if self._obeys else 0.0
         missing_w = self._note(car, command, off_w, demand_w, wanted_mps)
         fuel_g = float(engine["pwr_fuel_watts"]) / self._vehicle.engine.lhv_j_per_g
+        heat = self._heat(car)
         following = PlantState(
             float(battery["soc"]),
-            state.t_cl_degc,
+            heat.get("t_cl_degc", state.t_cl_degc),
             on,
             min(state.engine_for_s + 1, LONG_AGO_S) if on == state.engine_on else 1,
             p_eng_w,
@@ -78,16 +96,35 @@ class FastsimPlant:
             internal_w=battery["pwr_out_chemical_watts"],
             p_friction_w=car["state"]["pwr_brake_watts"] * self._eta_regen,
             p_missing_w=missing_w,
-            exhaust_w=0.0,
-            air_w=0.0,
+            exhaust_w=heat.get("exhaust_w", 0.0),
+            air_w=heat.get("air_w", 0.0),
             radiator_w=0.0,
-            cabin_w=0.0,
+            cabin_w=heat.get("cabin_w", 0.0),
             boiling_w=0.0,
-            coolant_w=0.0,
+            coolant_w=heat.get("coolant_w", 0.0),
             started=on and not state.engine_on,
             power_excess_w=off_w if off_w > POWER_TOLERANCE_W else 0.0,
         )
         return following, flows
+
+    def _heat(self, car: Tree) -> dict[str, float]:
+        """Return temperature of the engine and flows of heat, of a heated car; keep the cabin's."""
+        if not self._model.heated:
+            return {}
+        engine = component(car, "fc_heat")["state"]
+        cabin_k = component(car, "cabin")["state"]["temperature_kelvin"]
+        self._cabin_degc.append(float(cabin_k - ZERO_DEGC_K))
+        into_w, air_w, cabin_w = (
+            float(engine[f"pwr_{name}_watts"])
+            for name in ("thrml_to_tm", "thrml_to_amb", "thrml_fc_to_cab")
+        )
+        return {
+            "t_cl_degc": float(engine["temperature_kelvin"] - ZERO_DEGC_K),
+            "exhaust_w": float(engine["pwr_fuel_as_heat_watts"]) - into_w,
+            "air_w": air_w,
+            "cabin_w": cabin_w,
+            "coolant_w": into_w - air_w - cabin_w,
+        }
 
     def _note(
         self, car: Tree, command: Command, off_w: float, demand_w: float, wanted_mps: float
@@ -115,7 +152,7 @@ class FastsimPlant:
             for off, other in zip(self._off_w, self._switched, strict=True)
         ]
         return {
-            "name": "fastsim",
+            "name": self._model.plant,
             "obeys": self._obeys,
             "seconds_not_obeyed": sum(disobeyed),
             "seconds_switched_otherwise": sum(self._switched),
@@ -125,6 +162,8 @@ class FastsimPlant:
             "speed_off_max_mps": max(self._beside_mps, default=0.0),
             "energy_missing_j": sum(self._missing_w),
             "demand_off_max_w": max(self._demand_off_w, default=0.0),
+            "cabin_min_degc": min(self._cabin_degc, default=None),
+            "cabin_mean_degc": fmean(self._cabin_degc) if self._cabin_degc else None,
         }
 
     def remarks(self) -> tuple[str, ...]:
