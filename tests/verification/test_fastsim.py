@@ -7,6 +7,7 @@ from pathlib import Path
 import fastsim
 import numpy as np
 import pytest
+from fastsim_run import whole_run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -22,9 +23,7 @@ from qpmpc.verification.fastsim.one_second import (
     PRIUS,
     SecondBySecond,
     component,
-    departing,
     parameters,
-    shipped_car,
     whole_road,
 )
 from qpmpc.verification.fastsim.plant import FastsimPlant
@@ -37,22 +36,11 @@ STORE_J = component(CAR, "res")["energy_capacity_joules"]
 NYCC = qpmpc.Trip("nycc", believed_vehicle())
 
 
-def whole_run(cycle: Cycle, soc: float) -> dict:
-    """FASTSim's own run of a whole cycle, with its history."""
-    car = fastsim.Vehicle.from_dict(departing(shipped_car(PRIUS), soc, float(cycle.speed_mps[0])))
-    car.set_save_interval(1)
-    allowed = {**fastsim.SimParams.default().to_dict(), "trace_miss_opts": "Allow"}
-    road = fastsim.Cycle.from_dict(whole_road(cycle))
-    drive = fastsim.SimDrive(car, road, fastsim.SimParams.from_dict(allowed))
-    drive.run_once()
-    return drive.to_dict()["veh"]
-
-
 # wltc-3b: it misses the trace in a second; train-010: hills
 @pytest.mark.parametrize("name", ["nycc", "udds", "wltc-3b", "train-010"])
 def test_stepping_repeats_the_whole_run(name: str) -> None:
     cycle = load_cycle(name)
-    whole = whole_run(cycle, 0.55)
+    whole = whole_run(PRIUS, cycle, 0.55)
     car = SecondBySecond(PRIUS, 0.55, float(cycle.speed_mps[0]))
     states = [
         {part: component(now, part)["state"] for part in ("fc", "res", "vehicle")}

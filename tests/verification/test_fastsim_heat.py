@@ -4,15 +4,15 @@ import json
 import re
 from pathlib import Path
 
-import fastsim
 import numpy as np
 import pytest
+from fastsim_run import whole_run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import qpmpc
 from qpmpc.cli import main
-from qpmpc.cycles import Cycle, load_cycle
+from qpmpc.cycles import load_cycle
 from qpmpc.vehicle import Command
 from qpmpc.vehicle.engine import alpha, optimal_line
 from qpmpc.verification.fastsim.believed import LINE_FROM, believed_vehicle, stored_w
@@ -23,10 +23,7 @@ from qpmpc.verification.fastsim.one_second import (
     ZERO_DEGC_K,
     SecondBySecond,
     component,
-    departing,
     parameters,
-    shipped_car,
-    whole_road,
 )
 
 ROOT = Path(__file__).parents[2]
@@ -36,18 +33,6 @@ NYCC = qpmpc.Trip("nycc", VEHICLE)
 HEAT = component(CAR, "fc_heat")
 HEAT_J_PER_K = HEAT["heat_capacitance_joules_per_kelvin"]
 COLD = HEAT["fc_eff_model"]["Exponential"]
-
-
-def whole_run(cycle: Cycle, t_cl_degc: float, t_amb_degc: float) -> dict:
-    """FASTSim's own run of a whole cycle, with its history."""
-    speed_mps = float(cycle.speed_mps[0])
-    car = fastsim.Vehicle.from_dict(departing(shipped_car(SONATA), 0.55, speed_mps, t_cl_degc))
-    car.set_save_interval(1)
-    allowed = {**fastsim.SimParams.default().to_dict(), "trace_miss_opts": "Allow"}
-    road = fastsim.Cycle.from_dict(whole_road(cycle, t_amb_degc))
-    drive = fastsim.SimDrive(car, road, fastsim.SimParams.from_dict(allowed))
-    drive.run_once()
-    return drive.to_dict()["veh"]
 
 
 # wltc-3b: its engine is at 127 °C in the end; train-010: hills; a summer's day: the cabin is cooled
@@ -62,7 +47,7 @@ def whole_run(cycle: Cycle, t_cl_degc: float, t_amb_degc: float) -> dict:
 )
 def test_stepping_repeats_the_whole_run(name: str, t_cl_degc: float, t_amb_degc: float) -> None:
     cycle = load_cycle(name)
-    whole = whole_run(cycle, t_cl_degc, t_amb_degc)
+    whole = whole_run(SONATA, cycle, 0.55, t_cl_degc, t_amb_degc)
     car = SecondBySecond(SONATA, 0.55, float(cycle.speed_mps[0]), t_cl_degc, t_amb_degc)
     seconds = [
         car.drive(float(speed), float(grade), None)
@@ -144,7 +129,7 @@ def test_the_believed_car_is_fastsims_where_it_can_be() -> None:
 
 def test_the_cabin_asks_for_what_fastsims_takes() -> None:
     """In the mean of UDDS at -7 °C, and in proportion to the cold outside."""
-    now = whole_run(load_cycle("udds"), 65.0, -7.0)
+    now = whole_run(SONATA, load_cycle("udds"), 0.55, 65.0, -7.0)
     taken_w = np.mean(component(now, "hvac")["history"]["pwr_thrml_fc_to_cabin_watts"])
     assert pytest.approx(taken_w, rel=0.25) == VEHICLE.thermal.cabin_heat_w
     colder = believed_vehicle(model=SONATA, t_amb_degc=-20.0)
