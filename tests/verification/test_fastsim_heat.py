@@ -17,7 +17,7 @@ from qpmpc.vehicle import Command
 from qpmpc.vehicle.engine import alpha, optimal_line
 from qpmpc.verification.fastsim.believed import LINE_FROM, believed_vehicle, stored_w
 from qpmpc.verification.fastsim.car import FASTSIM_SONATA
-from qpmpc.verification.fastsim.heat import efficiency_left
+from qpmpc.verification.fastsim.heat import CABIN_DEGC, efficiency_left
 from qpmpc.verification.fastsim.one_second import (
     SONATA,
     ZERO_DEGC_K,
@@ -185,6 +185,16 @@ def test_the_air_can_be_set_and_is_said(tmp_path: Path) -> None:
     assert "Air of -15 °C" in "\n".join(run["remarks"])
     assert run["plant"]["name"] == "fastsim-sonata"
     assert 20.0 < run["plant"]["cabin_min_degc"] < run["plant"]["cabin_mean_degc"] < 22.0
+
+
+def test_what_the_cabin_is_kept_at_is_fastsims_and_cooling_is_said() -> None:
+    hvac, cabin = component(CAR, "hvac"), component(CAR, "cabin")["state"]
+    for kelvin in (hvac["te_set_kelvin"], cabin["temperature_kelvin"]):
+        assert kelvin - ZERO_DEGC_K == pytest.approx(CABIN_DEGC)
+    assert not any("cools it" in line for line in FASTSIM_SONATA.remarks(VEHICLE))
+    summer = believed_vehicle(model=SONATA, t_amb_degc=35.0)
+    assert summer.thermal.cabin_heat_w == 0.0
+    assert any("cools it from the battery" in line for line in FASTSIM_SONATA.remarks(summer))
 
 
 def test_what_has_no_effect_is_refused(capsys) -> None:

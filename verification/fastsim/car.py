@@ -9,7 +9,7 @@ from qpmpc.errors import InputError
 from qpmpc.trip import Observation, Trip
 from qpmpc.vehicle import Command, Vehicle
 from qpmpc.verification.fastsim.believed import believed_vehicle
-from qpmpc.verification.fastsim.heat import T_CL_DEGC
+from qpmpc.verification.fastsim.heat import CABIN_DEGC, T_CL_DEGC
 from qpmpc.verification.fastsim.one_second import (
     PRIUS,
     SONATA,
@@ -120,7 +120,8 @@ class Fastsim:
     def remarks(self, vehicle: Vehicle) -> list[str]:
         """Return what every run on this plant rests on."""
         heat = (
-            f"Air of {vehicle.thermal.t_amb_degc:g} °C; cabin and battery depart at FASTSim's 22 °C"
+            f"Air of {vehicle.thermal.t_amb_degc:g} °C; cabin and battery depart at "
+            f"{CABIN_DEGC:g} °C"
             if self.model.heated
             else f"No coolant: {T_CL_DEGC:g} °C throughout"
         )
@@ -131,6 +132,11 @@ class Fastsim:
             "what final SOC differs from the initial one is priced at an efficiency of "
             f"{vehicle.trip.eta_eq:.3g} (trip.eta_eq)",
         ]
+        if self.model.heated and vehicle.thermal.t_amb_degc > CABIN_DEGC:
+            said.append(
+                f"the air is warmer than the cabin of {CABIN_DEGC:g} °C: FASTSim cools it from the "
+                "battery, of which controllers know nothing"
+            )
         if vehicle.engine.start_fuel_g or vehicle.engine.start_energy_j:
             said.append("starts cost something in what controllers believe only, not in FASTSim")
         return said

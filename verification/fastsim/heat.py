@@ -30,6 +30,7 @@ HEAT_CAPACITY_J_PER_K = 1e9
 WITHOUT_T_AMB_DEGC = 20.0
 # A heated one, where nothing else is said: 20 F, EPA's cold test.
 T_AMB_DEGC = -7.0
+CABIN_DEGC = 22.0  # what FASTSim's cars depart at, and keep in the cabin
 T_CL_MAX_DEGC = 150.0  # FASTSim has no upper limit; its own control gets to 141 °C on HWFET
 # What depends on speed is that of town: so much of the time standing, the rest at this speed.
 STANDING, TOWN_MPS = 0.2, 15.0
