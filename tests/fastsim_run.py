@@ -1,9 +1,26 @@
-"""FASTSim's own run of a whole cycle, against which stepping is held."""
+"""FASTSim's own run of a whole cycle, against which stepping is held; and what docs say of runs."""
+
+import re
+from pathlib import Path
 
 import fastsim
 
 from qpmpc.cycles import Cycle
 from qpmpc.verification.fastsim.one_second import Model, departing, shipped_car, whole_road
+
+PAGE = Path(__file__).parents[1] / "docs" / "fastsim.md"
+
+
+def documented(model: Model) -> str:
+    """The table of a car in docs/fastsim.md."""
+    text = PAGE.read_text("utf-8")
+    return text.partition(f"<!-- {model.plant}: ")[2].partition(f"<!-- end of {model.plant} -->")[0]
+
+
+def documented_fuels(model: Model) -> list[tuple[str, str, str]]:
+    """Cycle, controller and fuel of own control, rules and `mh-qp` there."""
+    names = f"{model.plant}|rule-based|mh-qp"
+    return re.findall(rf"^\| ([\w-]+) \| ({names}) \| ([\d.]+)", documented(model), re.M)
 
 
 def whole_run(

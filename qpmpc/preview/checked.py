@@ -13,7 +13,6 @@ from qpmpc.errors import QpmpcError
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.preview.stages import Preview, StageBuilder, Stages
 from qpmpc.vehicle.capability import Capability
-from qpmpc.vehicle.must_run import begun_s
 from qpmpc.vehicle.plant import Plant
 
 LONGEST_STAGE_S = 1e5
@@ -57,7 +56,6 @@ class CheckedPreview:
     ) -> None:
         self.source, self.was_bad = source, False
         self.receive = receive or source.preview
-        self._vehicle = plant.vehicle
         self._can = Capability.of(plant.vehicle, plant.line)
         self._last: Stages | None = None
         self._last_step = 0
@@ -116,8 +114,7 @@ class CheckedPreview:
         NoPreviewError
             As `at`.
         """
-        left_s = begun_s(self._vehicle, engine_on, engine_for_s)
-        return self.at(step).running_on(min(left_s, self.settings.short_stages))
+        return self.source.held(self.at(step), engine_on, engine_for_s)
 
     def _is_possible(self, preview: Preview) -> bool:
         """Whether the car can drive it."""

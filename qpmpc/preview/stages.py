@@ -10,7 +10,7 @@ from qpmpc.preview.forecast import Trace, internal_off_w
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.preview.place import forecast_seconds
 from qpmpc.preview.swing import NO_LIMIT_J, rooms, swings
-from qpmpc.vehicle.must_run import must_run, too_fast
+from qpmpc.vehicle.must_run import begun_s, must_run, too_fast
 from qpmpc.vehicle.parameters import Vehicle
 
 LEAST_SHARE = 1e-6  # of a second in a day: below it is rounding
@@ -70,16 +70,6 @@ class Stages:
             after_j = max(after_j - float(spent_j[end + 1 : following + 1].sum()), 0.0)
             found[end] = after_j
         return found
-
-    def running_on(self, seconds: int) -> "Stages":
-        """Return the stages with an engine that must run in the first `seconds` of 1 s.
-
-        Masked stages are as before.
-        """
-        if seconds <= 0:
-            return self
-        held = (np.arange(len(self.duration_s)) < seconds) & (self.duration_s > 0.0)
-        return replace(self, must_share=np.where(held, 1.0, self.must_share))
 
     def arrival_s(self, short_stages: int) -> int | None:
         """Seconds until arrival, None where that is beyond the first `short_stages` of 1 s."""
@@ -180,6 +170,23 @@ class StageBuilder:
     def at(self, step: int) -> Stages:
         """Return the stages of the horizon that starts at time step `step`."""
         return self.stages(self.preview(step))
+
+    def held(self, stages: Stages, engine_on: bool, engine_for_s: int) -> Stages:
+        """Return stages in whose seconds a run of the engine that has begun must go on.
+
+        Masked stages are as before.
+
+        Parameters
+        ----------
+        stages : from now on
+        engine_on, engine_for_s : whether the engine runs, and for how long it has
+        """
+        left_s = begun_s(self._vehicle, engine_on, engine_for_s)
+        if left_s == 0:
+            return stages
+        seconds = np.arange(self.count) < min(left_s, self.settings.short_stages)
+        held = seconds & (stages.duration_s > 0.0)
+        return replace(stages, must_share=np.where(held, 1.0, stages.must_share))
 
     def stages(self, preview: Preview) -> Stages:
         """Return the stages of a preview, short ones first."""

@@ -7,7 +7,7 @@ from pathlib import Path
 import fastsim
 import numpy as np
 import pytest
-from fastsim_run import whole_run
+from fastsim_run import documented, documented_fuels, whole_run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -182,16 +182,8 @@ def test_a_map_that_is_learned_is_no_worse_than_rules_nor_than_the_right_one(mea
     assert run.fuel_soc_balanced_g < 1.005 * measured["hwfet", "mh-qp"].fuel_soc_balanced_g
 
 
-def documented() -> str:
-    """The table of this car in docs/fastsim.md."""
-    page = (ROOT / "docs" / "fastsim.md").read_text("utf-8")
-    return page.partition("<!-- fastsim: ")[2].partition("<!-- end of fastsim -->")[0]
-
-
 def test_docs_state_what_is_measured(measured) -> None:
-    stated = re.findall(
-        r"^\| ([\w-]+) \| (fastsim|rule-based|mh-qp) \| ([\d.]+)", documented(), re.M
-    )
+    stated = documented_fuels(PRIUS)
     assert len(stated) == 3 * 4
     for cycle, name, fuel_g in stated:
         if (cycle, name) in measured:
@@ -204,7 +196,7 @@ def test_readme_states_what_the_page_does() -> None:
     stated = {
         (cycle, label): (fuel, percent)
         for cycle, label, fuel, percent in re.findall(
-            r"^\| ([\w-]+) \| ([^|]+) \| ([\d.]+)(?:\\\*)? \| ([\d.-]+) \|", documented(), re.M
+            r"^\| ([\w-]+) \| ([^|]+) \| ([\d.]+)(?:\\\*)? \| ([\d.-]+) \|", documented(PRIUS), re.M
         )
     }
     labels = {

@@ -1,12 +1,11 @@
 """FASTSim's Sonata as the plant: an engine that warms up, and a cabin that takes heat from it."""
 
 import json
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
-from fastsim_run import whole_run
+from fastsim_run import documented_fuels, whole_run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -26,7 +25,6 @@ from qpmpc.verification.fastsim.one_second import (
     parameters,
 )
 
-ROOT = Path(__file__).parents[2]
 CAR = parameters(SONATA)
 VEHICLE = believed_vehicle(model=SONATA)
 NYCC = qpmpc.Trip("nycc", VEHICLE)
@@ -162,11 +160,7 @@ def test_mh_qp_beats_fastsims_own_control_and_our_rules(measured) -> None:
 
 
 def test_docs_state_what_is_measured(measured) -> None:
-    page = (ROOT / "docs" / "fastsim.md").read_text("utf-8")
-    table = page.partition("<!-- fastsim-sonata: ")[2].partition("<!-- end of fastsim-sonata")[0]
-    stated = re.findall(
-        r"^\| ([\w-]+) \| (fastsim-sonata|rule-based|mh-qp) \| ([\d.]+)", table, re.M
-    )
+    stated = documented_fuels(SONATA)
     assert len(stated) == 3 * 4
     for cycle, name, fuel_g in stated:
         if (cycle, name) in measured:

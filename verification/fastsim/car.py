@@ -51,13 +51,13 @@ class OwnControl(Controller):
     ) -> None:
         self.name = model.plant
         super().__init__(trip, settings)
-        car, around = shipped_car(model), conditions(model, trip.vehicle)
-        road = whole_road(trip.cycle, *around[1:])
+        t_cl_degc, t_amb_degc = conditions(model, trip.vehicle)
+        car, road = shipped_car(model), whole_road(trip.cycle, t_amb_degc)
+        speed_mps = float(trip.cycle.speed_mps[0])
         limit = component(car, "sim_params")["res_per_fuel_lim"]
         self.soc_init = trip.vehicle.trip.soc_init
         for _ in range(ROUNDS):
-            speed_mps = float(trip.cycle.speed_mps[0])
-            end = driven(departing(car, self.soc_init, speed_mps, *around[:1]), road)
+            end = driven(departing(car, self.soc_init, speed_mps, t_cl_degc), road)
             battery, engine = component(end, "res")["state"], component(end, "fc")["state"]
             given_j, burnt_j = battery["energy_out_chemical_joules"], engine["energy_fuel_joules"]
             if abs(given_j) < limit * burnt_j:

@@ -17,9 +17,11 @@ from qpmpc.verification.fastsim.one_second import (
 )
 
 
-def conditions(model: Model, vehicle: Vehicle) -> tuple[float, float] | tuple[()]:
-    """Temperatures of engine at departure and air, of a heated car."""
-    return (vehicle.trip.t_cl_init_degc, vehicle.thermal.t_amb_degc) if model.heated else ()
+def conditions(model: Model, vehicle: Vehicle) -> tuple[float | None, float | None]:
+    """Temperatures of engine at departure and air; None each for a car without heat."""
+    if not model.heated:
+        return None, None
+    return vehicle.trip.t_cl_init_degc, vehicle.thermal.t_amb_degc
 
 
 class FastsimPlant:

@@ -21,7 +21,6 @@ from qpmpc.qp.stage_qp import QpData, StageQp
 from qpmpc.solvers.base import Status
 from qpmpc.solvers.piqp import Piqp
 from qpmpc.trip import Trip
-from qpmpc.vehicle.must_run import begun_s
 from qpmpc.verification.renderings.cvxpy_matrices import cvxpy_matrices
 from qpmpc.verification.renderings.generated_qp import GeneratedQp
 from qpmpc.verification.renderings.matrices import Matrices, difference, matrices_of
@@ -101,7 +100,6 @@ class Renderings:
 
     def __init__(self, trip: Trip, settings: ControllerSettings) -> None:
         chosen, vehicle = settings.mh_qp, trip.vehicle
-        self._vehicle = vehicle
         model = PwaModel.of(vehicle, chosen.pwa)
         self.preview = trip.preview(chosen.horizon)
         stages = self.preview.count
@@ -120,9 +118,8 @@ class Renderings:
         """Return the data for updating the renderings in Python."""
         seen = case.seen
         about = Linearisation.about(case.x, seen.t_cl_degc, self.preview.settings)
-        left_s = begun_s(self._vehicle, seen.engine_on, seen.engine_for_s)
-        held_s = min(left_s, self.preview.settings.short_stages)
-        stages = self.preview.source.at(seen.step).running_on(held_s)
+        source = self.preview.source
+        stages = source.held(source.at(seen.step), seen.engine_on, seen.engine_for_s)
         return stages, seen.soc, seen.t_cl_degc, about, seen.engine_on
 
     def compare(self, case: QpCase) -> dict[str, Difference]:
