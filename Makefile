@@ -1,5 +1,6 @@
 # make run    the main job: real cycles, rule-based against MPC, tables and pictures in results/
-# make test   style, types and tests
+# make test   style, types and tests, all but the longest
+# make test-slow  the longest tests: every mutation, variant and documented study
 # make fuzz   100,000 hostile inputs to the loaders of users' files
 # make release-check  wheel and sdist, built and tried in clean environments of every Python here
 # make sbom   licences of what is shipped and needed, in build/sbom.cdx.json
@@ -19,13 +20,16 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 # in which the mapped folders are where they are imported from.
 TYPED := build/typed
 
-.PHONY: run test fuzz lint types docs release-check sbom history venv clean
+.PHONY: run test test-slow fuzz lint types docs release-check sbom history venv clean
 
 run: $(STAMP)
 	$(BIN)/qpmpc compare nycc nedc-truncated --controllers rule-based,mh-qp-paper,mh-qp --out results
 
 test: lint types
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -m "not slow"
+
+test-slow: $(STAMP)
+	$(BIN)/python -m pytest -m slow
 
 fuzz: $(STAMP)
 	QPMPC_FUZZ=100000 $(BIN)/python -m pytest --dist=load tests/test_hostile_inputs.py

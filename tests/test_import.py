@@ -50,6 +50,7 @@ def test_import_beside_the_other_distribution_fails(tmp_path: Path) -> None:
     assert "pip uninstall qpmpc" in run.stderr.strip().splitlines()[-1]
 
 
+@pytest.mark.slow
 def test_controllers_are_made_without_casadi() -> None:
     """Only the nonlinear program takes it, and is refused before any of it is loaded."""
     code = (

@@ -65,6 +65,14 @@ def test_hooks_are_targets_of_the_makefile():
         assert target in targets
 
 
+def test_continuous_integration_leaves_no_test_out():
+    makefile = (ROOT / "Makefile").read_text("utf-8")
+    chosen = re.findall(r"^(test[\w-]*):.*\n\t.*pytest -m \"?([^\"\n]+)", makefile, re.MULTILINE)
+    assert chosen == [("test", "not slow"), ("test-slow", "slow")]
+    commands = (ROOT / ".ci" / "run").read_text("utf-8").splitlines()
+    assert [f"make {target}" for target, _ in chosen] == commands[-2:]
+
+
 def test_the_forms_are_there():
     assert [form.stem for form in FORMS] == ["bug", "cycle", "vehicle-data"]
 

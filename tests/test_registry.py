@@ -139,6 +139,7 @@ def run(environment: dict[str, str], *arguments: str) -> subprocess.CompletedPro
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 def test_a_package_adds_controllers_vehicles_and_cycles(installed: dict[str, str]) -> None:
     names = "sample-threshold,sample-steady,rule-based,mh-qp"
     done = run(

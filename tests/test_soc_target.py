@@ -68,6 +68,7 @@ def test_near_the_optimum(short, asked):
     assert run.fuel_soc_balanced_g < 1.006 * optimum.fuel_soc_balanced_g
 
 
+@pytest.mark.slow
 def test_the_proven_bound_knows_what_the_battery_is_to_give(short):
     trip = Trip(short, load_vehicle("prius-liion").with_settings(EMPTIER))
     bound = lower_bound(trip.cycle, trip.vehicle)

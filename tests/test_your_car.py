@@ -77,6 +77,7 @@ def folder(tmp_path_factory):
         yield path
 
 
+@pytest.mark.slow
 def test_what_was_odd_about_the_bench_is_said(folder):
     remarks = json.loads((folder / "map.json").read_text())["remarks"]
     points = len(bench().splitlines()) - 3

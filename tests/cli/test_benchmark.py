@@ -5,6 +5,7 @@ import pytest
 pytest.importorskip("casadi")
 
 
+@pytest.mark.slow
 def test_cycles_vehicle_candidates_and_settings_are_chosen(
     cli, trip, strict_json, tmp_path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -52,6 +52,7 @@ def test_cycles_are_compared_apart(cli, strict_json, trip):
     assert runs[0]["saving_vs_rule_percent"] == runs[2]["saving_vs_rule_percent"] == 0.0
 
 
+@pytest.mark.slow
 def test_the_nonlinear_program_is_a_controller_like_others(cli, strict_json, trip, tmp_path):
     done = cli("compare", trip, *FREE, "--controllers", "rule-based,mh-nlp", "--out", tmp_path)
     assert done.code == 0
@@ -66,6 +67,7 @@ def test_the_nonlinear_program_is_a_controller_like_others(cli, strict_json, tri
     assert "short_stages" in page  # the horizon, a setting of mh-qp that counts here too
 
 
+@pytest.mark.slow
 def test_settings_of_mh_qp_reach_the_nonlinear_program(cli, strict_json, trip):
     command = ("simulate", trip, *FREE, "--controller", "mh-nlp", "--json", "-")
     low = strict_json(cli(*command).out)["soc_end"]

@@ -51,6 +51,7 @@ def test_json_on_stdout_is_nothing_but_json(cli, trip, strict_json):
     assert "algorithm osqp" in done.err
 
 
+@pytest.mark.slow
 @needs_tools
 def test_pareto_has_every_iteration_count_beside_the_optimum(cli, trip, tmp_path, strict_json):
     pytest.importorskip("numba", reason="not installed: numba, for dynamic programming")

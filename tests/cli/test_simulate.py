@@ -31,6 +31,7 @@ ALGORITHMS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("controller", ALGORITHMS)
 def test_json_has_the_keys_of_the_contract(cli, strict_json, trip, controller):
     done = cli("simulate", trip, "--controller", controller, "--json", "-")

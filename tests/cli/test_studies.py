@@ -27,6 +27,7 @@ def study(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_two_studies_are_compared(cli, study, tmp_path):
     out = tmp_path / "compared"
     done = cli("report", study / "a", study / "b", "--out", out, "--json", tmp_path / "c.json")

@@ -90,6 +90,7 @@ def total(file: Path) -> int:
     return int(found[1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("t_cl_init_degc", [50.0, 88.0])
 def test_instructions_vary_by_less_than_one_percent_over_a_trip(t_cl_init_degc) -> None:
     """Thermostat closed in the whole trip; and open at first, which takes exponentials."""
@@ -114,6 +115,7 @@ def test_those_of_costates_vary_by_less_than_one_percent(precision) -> None:
     assert np.ptp(counts) < 0.01 * np.median(counts)
 
 
+@pytest.mark.slow
 def test_instructions_are_a_fixed_part_a_part_a_stage_and_a_part_a_stage_and_iteration() -> None:
     """I = a + n (b + c K): three small builds give a, b and c, the default build obeys them."""
     whole = load_cycle("nycc")

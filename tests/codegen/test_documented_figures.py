@@ -73,6 +73,7 @@ def test_the_table_has_every_combination() -> None:
     assert set(table()) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 @pytest.mark.parametrize("precision", PRECISIONS)
 def test_instructions_flash_and_ram_are_as_documented(algorithm, precision) -> None:

@@ -65,6 +65,7 @@ def test_clangs_analyzer_finds_nothing(project) -> None:
     assert not found.stderr
 
 
+@pytest.mark.slow
 def test_cppcheck_finds_nothing(project) -> None:
     """All severities; only that nothing in these files calls the public functions is no finding."""
     need("cppcheck")
@@ -128,6 +129,7 @@ def misra(project: Path, *given: str) -> set[str]:
     return {name.removeprefix("misra-c2012-") for name in found}
 
 
+@pytest.mark.slow
 @ONCE_EACH
 def test_misra_findings_are_the_deviations_explained(project) -> None:
     """Files that depend on the build in every configuration, all others in that of the target."""

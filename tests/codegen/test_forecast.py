@@ -146,6 +146,7 @@ def test_short_trips_equal_python(library, steps) -> None:
     assert_same_inputs(library, cut("hwfet", steps))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "overrides",
     [

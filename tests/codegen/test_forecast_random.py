@@ -73,6 +73,7 @@ int main(void)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", PRECISIONS)
 def test_random_trips_and_seconds_under_sanitizers(tmp_path, precision) -> None:
     if shutil.which("gcc") is None:

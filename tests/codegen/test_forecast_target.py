@@ -87,6 +87,7 @@ def on_target(trip: Trace, folder: Path) -> tuple[float, np.ndarray, list[object
     return first * INSTRUCTIONS_A_TICK, each, list(records["in"])
 
 
+@pytest.mark.slow
 def test_cost_on_the_target_is_as_documented_and_does_not_grow_with_the_trip(tmp_path) -> None:
     stated = r"at most ([\d,]+) instructions per second.*?([\d,]+) per second of the\s+trip at"
     found = re.search(stated, EMBEDDED, re.DOTALL)

@@ -52,6 +52,7 @@ def trip() -> Trip:
     return Trip(Cycle("part", *part), load_vehicle("prius-nimh"))
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_the_same_commands_as_cvxpy(trip: Trip) -> None:
     pytest.importorskip("cvxpygen")

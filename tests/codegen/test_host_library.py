@@ -440,6 +440,7 @@ def test_a_compiler_that_fails_is_named_and_the_default_does_without(monkeypatch
     assert not list((tmp_path / "compiled").iterdir())
 
 
+@pytest.mark.slow
 def test_a_damaged_library_in_the_cache_is_built_again(tmp_path) -> None:
     # in processes of their own: one that has loaded a file takes it for loaded ever after
     trip = tmp_path / "trip.csv"

@@ -42,6 +42,7 @@ def is_osqp(folder) -> bool:
     return (folder / "osqp").is_dir()
 
 
+@pytest.mark.slow
 def test_hostile_seconds_break_no_promise_and_reach_everything(project) -> None:
     """Every step keeps its promises (promises.h) and, some seconds later, all is well again."""
     need("gcc")
@@ -63,6 +64,7 @@ def test_libfuzzer_finds_nothing_in_a_short_run(project) -> None:
     assert fuzzed.returncode == 0, fuzzed.stderr[-2000:]
 
 
+@pytest.mark.slow
 def test_memory_of_no_controller_is_found_out_and_a_corrupted_one_recovers(project) -> None:
     need("gcc")
     build(project, "gcc", STRICT, "bad_memory", "bad_memory.c", "promises.c", *SHARED)

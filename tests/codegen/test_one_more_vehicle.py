@@ -84,6 +84,7 @@ def only(folder: Path, suffix: str) -> Path:
     return file
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "precision"), [("gcc", "f64"), ("clang", "f32")])
 def test_commands_are_those_of_a_full_compilation_bit_by_bit(command, precision, tmp_path) -> None:
     found = shutil.which(command)
@@ -165,6 +166,7 @@ def test_a_fault_in_the_sources_is_not_laid_at_the_compilers_door(folder, calls,
     assert calls.sources[2:] == [["one.c"], ["mpc_data.c"]]
 
 
+@pytest.mark.slow
 @needs_maps
 def test_libraries_are_closed_when_nobody_uses_them_any_more(folder, tmp_path) -> None:
     values = numbers()

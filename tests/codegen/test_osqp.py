@@ -80,6 +80,7 @@ def drive(ours, steps: int, reference=None, trip=TRIP):
 
 
 # The same program, factorised in another order: round-off, as with the solver of our own.
+@pytest.mark.slow
 def test_double_precision_equals_python_to_the_end_of_the_trip(files) -> None:
     ours = controller(library_of(files))
     reference = MhQp(TRIP)
@@ -118,6 +119,7 @@ def test_other_vehicles_and_settings_equal_python(vehicle, overrides) -> None:
         assert mine.fallback == its.fallback
 
 
+@pytest.mark.slow
 def test_single_precision_burns_the_same_fuel() -> None:
     library = library_of(project_files(numbers(), "host", "f32", "osqp"), precision="f32")
     run = simulate(TRIP, waiting(library))

@@ -76,6 +76,7 @@ def result(request) -> PilResult:
     return processor_in_the_loop(trip, settings, precision=request.param, algorithm="osqp")
 
 
+@pytest.mark.slow
 def test_commands_are_those_of_osqp_in_python(result) -> None:
     # f64: round-off; f32: see the test of the other solver, the optimum is flat
     most_w = 1e-3 if result.precision == "f64" else 0.03 * CAR.engine.power_max_w

@@ -148,6 +148,7 @@ def test_a_prefixed_project_builds_by_its_makefile_with_its_example(tmp_path, al
     assert run(tmp_path, "./example").count("\n") == 61
 
 
+@pytest.mark.slow
 def test_prefixed_firmware_is_the_same_code(tmp_path) -> None:
     """The flags reach it too: without MPC_NATIVE_MINMAX it would be another, slower one."""
     missing = missing_tools()
@@ -227,6 +228,7 @@ def recorded(
     return went_in, came_out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "pair",
     [
@@ -252,6 +254,7 @@ def test_two_controllers_in_one_program_are_each_what_they_are_alone(tmp_path, p
         assert (tmp_path / f"{letter}.out").read_bytes() == alone
 
 
+@pytest.mark.slow
 def test_two_with_osqp_share_one_copy_of_its_functions(tmp_path) -> None:
     """Of one precision: its workspaces are apart, its functions are the same."""
     need("cc")

@@ -68,6 +68,7 @@ def replay(cycle: Cycle, vehicle: Vehicle, precision: Precision, prepared: bool)
     return cycle.steps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("corner", "precision"), [(0, "f64"), (2, "f32"), (3, "f32"), (6, "f64"), (7, "f32")]
 )
@@ -78,6 +79,7 @@ def test_corners_are_clean_under_sanitizers(corner, precision) -> None:
     assert replay(part("nycc", 0, steps), vehicle, precision, prepared=False) == steps
 
 
+@pytest.mark.slow
 def test_seconds_of_a_trip_with_departure_are_clean_under_sanitizers() -> None:
     need("gcc")
     replay(part("nycc", 200, 50), load_vehicle("prius-liion"), "f32", prepared=True)

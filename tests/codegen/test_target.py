@@ -87,6 +87,7 @@ def nycc() -> PilResult:
     return processor_in_the_loop(Trip("nycc", VEHICLE), precision="f32")
 
 
+@pytest.mark.slow
 def test_firmware_drives_nycc_like_python(nycc) -> None:
     data = nycc.summary()
     assert abs(data["fuel_difference_percent"]) <= 0.1
@@ -117,6 +118,7 @@ def test_reports_name_what_was_measured_and_what_was_assumed(nycc, tmp_path) -> 
     assert (tmp_path / "pil_nycc_f32.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_instruction_counts_repeat_to_the_instruction() -> None:
     trip = Trip(short_trip("nycc", 40), VEHICLE)
     first, second = (processor_in_the_loop(trip) for _ in range(2))

@@ -28,6 +28,7 @@ def fuel_g(learning: bool, late_s: int = 0, **settings: object) -> float:
     return run.fuel_soc_balanced_g
 
 
+@pytest.mark.slow
 def test_learning_wins_back_half_of_what_a_tilted_map_costs() -> None:
     """Measured: 0.97 % more than with the right map, and 0.03 % where it is learned."""
     right, wrong = fuel_g(False), fuel_g(False, fuel_tilt=-0.1)
@@ -46,6 +47,7 @@ def test_a_late_meter_costs_nothing_where_the_map_is_right(late_s: int) -> None:
     assert fuel_g(True, late_s) == pytest.approx(fuel_g(False), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_late_meter_wins_back_much_of_what_a_tilted_map_costs() -> None:
     """Measured: 0.46 of 0.97 %; what is late has to be known before a tilt is."""
     right, wrong = fuel_g(False), fuel_g(False, fuel_tilt=-0.1)

@@ -28,6 +28,7 @@ def driven(name: str) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
     return usual, changed, example
 
 
+@pytest.mark.slow
 def test_a_limit_on_starts_leaves_fewer_of_them() -> None:
     usual, changed, example = driven("engine_starts.py")
     # a start above the limit is priced at 25 times its fuel: longer runs are cheaper
@@ -38,6 +39,7 @@ def test_a_limit_on_starts_leaves_fewer_of_them() -> None:
     assert changed["figures"][most] <= example["MOST"] + 1
 
 
+@pytest.mark.slow
 def test_a_price_on_nox_leaves_less_of_it() -> None:
     usual, changed, _ = driven("nox.py")
     # its curve is convex: the same energy at less power, for longer, has less; the price is worth
@@ -45,6 +47,7 @@ def test_a_price_on_nox_leaves_less_of_it() -> None:
     assert changed["figures"]["nox_mg"] < 0.9 * usual["figures"]["nox_mg"]
 
 
+@pytest.mark.slow
 def test_a_limit_on_its_temperature_leaves_the_battery_cooler() -> None:
     usual, changed, example = driven("battery_temperature.py")
     # heat is R I2: the engine takes a part of the peaks; braking energy is taken all the same

@@ -59,6 +59,7 @@ def test_an_engine_without_a_ramp_needs_nothing_in_advance(net_w, soc):
     assert RampFloor(load_vehicle("paper-nimh")).least_w(net_w, soc) == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("implementation", ["c", "python"])
 @pytest.mark.parametrize(
     ("cycle", "soc"),

@@ -30,6 +30,7 @@ def trip(cycle: Cycle) -> Trip:
     return Trip(cycle)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("controller", "settings"),
     [

@@ -154,6 +154,7 @@ def test_the_preview_is_that_of_the_true_second_whatever_the_clock_says(nycc):
     assert heard[1:] == list(range(nycc.steps))  # after that of the departure
 
 
+@pytest.mark.slow
 def test_a_failure_of_the_solver_is_taken_as_a_real_one(nycc):
     for kind in ("python", "c"):
         run = simulate(
@@ -166,6 +167,7 @@ def test_a_failure_of_the_solver_is_taken_as_a_real_one(nycc):
         assert run.summary()["flags"] == {"solver failed": 2}
 
 
+@pytest.mark.slow
 def test_after_the_run_the_controller_is_as_before(nycc):
     made = RecedingHorizon(nycc, QpPlanner(nycc))
     before = drive(nycc, made)

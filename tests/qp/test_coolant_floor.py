@@ -68,6 +68,7 @@ def test_with_the_shipped_settings_nothing_is_asked() -> None:
     np.testing.assert_array_equal(floor, floor[0])
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
 def test_a_cold_descent_beside_a_full_battery_in_c_as_in_python() -> None:
     trip = Trip(descent(), COLD)

@@ -153,6 +153,7 @@ def test_what_all_pages_share(browser, file):
     assert_works(file, charts=1, tables=3, browser=browser)
 
 
+@pytest.mark.slow
 def test_without_scripts_the_pictures_are_there(opened):
     page = opened(java_script_enabled=False)
     assert page.locator("figure.chart > img").is_visible()

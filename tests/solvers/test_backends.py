@@ -80,6 +80,7 @@ def infeasible(recording: Recording) -> QpData:
     return replace(data, lower=lower, upper=upper)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*NATIVE, "qpsolvers:clarabel"])
 def test_optimum(name: str, of: Of) -> None:
     solved = 0
@@ -125,6 +126,7 @@ def test_unique_solution_is_found(name: str, of: Of) -> None:
     )
 
 
+@pytest.mark.slow
 def test_osqp_converges_to_the_same_optimum(recordings: list[Recording]) -> None:
     for recording in recordings:
         reference = make_solver("piqp", 1e-11)
@@ -143,6 +145,7 @@ def test_osqp_converges_to_the_same_optimum(recordings: list[Recording]) -> None
             assert objective(qp.data, found.primal) == pytest.approx(best, abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*NATIVE, "qpsolvers:clarabel"])
 def test_infeasible_is_noticed_and_forgotten(name: str, of: Of) -> None:
     recording = of(name)[0]
@@ -190,6 +193,7 @@ def test_bad_data_is_refused(name: str, of: Of) -> None:
         assert not found.usable
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NATIVE)
 def test_update_equals_new_setup(name: str, of: Of) -> None:
     """Values brought in by an update, equalities appearing, bounds vanishing: as if set up new."""

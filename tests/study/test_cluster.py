@@ -59,6 +59,7 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
     made.close()
 
 
+@pytest.mark.slow
 def test_values_are_those_of_this_machine_even_if_a_worker_is_killed(
     tmp_path: Path, cluster: Cluster
 ) -> None:
@@ -78,6 +79,7 @@ def test_values_are_those_of_this_machine_even_if_a_worker_is_killed(
     assert_frame_equal(values(there), values(here), check_exact=True)
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_goes_away_is_one_line_and_nothing_is_lost(
     tmp_path: Path, cluster: Cluster
 ) -> None:

@@ -64,6 +64,7 @@ def test_the_published_runs_are_those_of_the_study(name: str) -> None:
         assert row["controller"] == parameters.controller
 
 
+@pytest.mark.slow
 def test_published_runs_are_made_again() -> None:
     """Three short ones: if the controller changes, the study has to be run again."""
     planned = list(load_study("generalisation-judge").runs())

@@ -162,6 +162,7 @@ def test_ctrl_c_ends_it_with_all_that_was_finished(tmp_path: Path) -> None:
     assert values(folder)["error"].isna().all()
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_one_line(tmp_path: Path) -> None:
     """A limit of the size of files gives the same error from the kernel as a disk that is full.
 

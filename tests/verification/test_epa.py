@@ -31,6 +31,7 @@ def test_us06_is_the_published_schedule():
     assert cycle.speed_mps.max() / 0.44704 == pytest.approx(80.3, abs=0.05)
 
 
+@pytest.mark.slow
 def test_the_command_shows_both_figures(capsys):
     assert main() == 0
     shown = capsys.readouterr().out

@@ -61,6 +61,7 @@ def assert_equal(renderings: Renderings, case: QpCase) -> None:
         assert off.violation < OPTIMUM, name
 
 
+@pytest.mark.slow
 def test_recorded_and_random_cases() -> None:
     equivalence = check_equivalence(Trip(beginning("nycc", 150), VEHICLE), every=50, random=4)
     assert equivalence.to_dict()["cases"] == 7
@@ -84,6 +85,7 @@ def test_recorded_cases_are_the_qps_of_the_road() -> None:
             np.testing.assert_array_equal(getattr(data, part), getattr(theirs, part))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("vehicle_changes", "changes"),
     [
@@ -112,6 +114,7 @@ def test_other_settings(vehicle_changes: dict[str, object], changes: dict[str, o
         assert_equal(renderings, case)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
 @pytest.mark.parametrize(
     ("file", "old", "new", "part"),

@@ -162,6 +162,7 @@ def measured() -> dict[tuple[str, str], qpmpc.Run]:
     return {(run.cycle, run.controller): run for run in runs}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cycle", "percent"), [("udds", 14.0), ("hwfet", 4.0), ("nycc", 14.0)])
 def test_mh_qp_beats_fastsims_own_control(measured, cycle: str, percent: float) -> None:
     own, rules, mine = (measured[cycle, name] for name in ("fastsim", "rule-based", "mh-qp"))

@@ -144,6 +144,7 @@ def measured() -> dict[tuple[str, str], qpmpc.Run]:
     return {(run.cycle, run.controller): run for run in runs}
 
 
+@pytest.mark.slow
 def test_mh_qp_beats_fastsims_own_control_and_our_rules(measured) -> None:
     own, rules, mine = (
         measured["udds", name] for name in ("fastsim-sonata", "rule-based", "mh-qp")

@@ -182,6 +182,7 @@ def assert_drives_by_itself(summary: dict[str, Any], *limits: str) -> None:
     assert [summary["violations"][name] for name in limits] == [0.0] * len(limits)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "limits"),
     [
@@ -238,6 +239,7 @@ def test_its_soc_limits_are_those_of_the_qp() -> None:
     assert soc_high[~limited] == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_comparison() -> None:
     cycle = beginning("nycc", 200)
     comparison = compare([Trip(cycle, VEHICLE)], every=20)

@@ -59,6 +59,7 @@ def test_degenerate_ones_are(problems) -> None:
             assert not data.hessian.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", solver_names())
 def test_backend(name: str, problems) -> None:
     # they take a second for each: the harder ones of the city are enough for them here
