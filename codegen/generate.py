@@ -44,7 +44,8 @@ OF_BUDGET = "The sizes are the controller's budget: a build that\n * does not fi
 # Files of the runtime that one method alone has; those of costates by their beginnings.
 OF_ADMM = {"mpc_admm.c", "mpc_admm.h"}
 OF_COSTATE = ("mpc_costate", "mpc_elementary")
-OF_QP = {"mpc_qp.c", "mpc_qp_method.c", "mpc_polish.c"}
+OF_QP = {"mpc_qp.c", "mpc_qp_method.c", "mpc_polish.c", "mpc_last_run.c"}
+OF_STARTS = {"mpc_last_run.c"}  # if one costs anything
 
 Name = TypeVar("Name", bound=str)
 
@@ -148,6 +149,8 @@ def algorithm_of(values: Values, algorithm: Algorithm) -> Algorithm:
 def _runtime(values: Values, algorithm: Algorithm) -> dict[str, str]:
     """Return the runtime's files of a method, and the headers made for it."""
     left_out = set() if values.learning else {"mpc_learned.c"}
+    if not values.has_start:
+        left_out |= OF_STARTS
     if algorithm != "admm":
         left_out |= OF_ADMM
     if algorithm == "costate":

@@ -9,6 +9,14 @@ typedef struct {
     int32_t engine_on;
 } mpc_command;
 
+/* What a second's rates cost, duals of SOC and coolant included: g per g of fuel of the hot engine, per
+ * J of engine work, per J from the battery's store. */
+typedef struct {
+    mpc_real fuel;
+    mpc_real p_eng;
+    mpc_real internal;
+} mpc_prices;
+
 /* mpc_maps.c: maps of engine and battery */
 mpc_real mpc_map_fuel_g_per_s(mpc_real p_eng_w);
 mpc_real mpc_map_cold_factor(mpc_real t_cl_degc);
@@ -45,8 +53,13 @@ void mpc_method_report(const mpc_state *state, mpc_out *out);
 void mpc_qp_update(mpc_state *state);
 mpc_real mpc_qp_relaxation_gap(const mpc_state *state);
 
-/* mpc_polish.c: the first second at the plan's prices */
-mpc_real mpc_polish_power_w(const mpc_state *state, mpc_real planned_w);
+/* mpc_polish.c: the first second at the plan's prices. mpc_polish_power_w: its engine power, of a plan
+ * in SI units; planned_w if a charge has no price. */
+mpc_prices mpc_polish_prices(const mpc_state *state);
+mpc_real mpc_polish_power_w(const mpc_state *state, const mpc_prices *prices, mpc_real planned_w);
+
+/* mpc_last_run.c: power at which a run goes on for all that the plan still wants; 0 if it need not */
+mpc_real mpc_last_run_w(const mpc_state *state);
 
 /* mpc_ramp.c: what the ramp asks of the coming second */
 mpc_real mpc_ramp_least_w(const mpc_state *state);

@@ -16,21 +16,25 @@ static mpc_real by_row(const mpc_stage *stage, int32_t row, int32_t variable, mp
     return (stage->y[row] * entry) / (stage->row[row] * stage->column[variable]);
 }
 
-/* Engine power of the coming second, of a plan in SI units; planned_w if a charge has no price. */
-mpc_real mpc_polish_power_w(const mpc_state *state, mpc_real planned_w)
+mpc_prices mpc_polish_prices(const mpc_state *state)
 {
     const mpc_stage *const stage = &state->stage[0];
-    const mpc_real net_w = stage->road.net_w;
     const mpc_real own = stage->q[MPC_VAR_FUEL] / (stage->column[MPC_VAR_FUEL] * state->cost);
-    const mpc_real fuel = own + by_row(stage, MPC_ROW_T_CL, MPC_VAR_FUEL, stage->a.t_cl.fuel);
-    const mpc_real p_eng = by_row(stage, MPC_ROW_T_CL, MPC_VAR_P_ENG, stage->a.t_cl.p_eng);
-    const mpc_real internal = by_row(stage, MPC_ROW_SOC, MPC_VAR_INTERNAL, stage->a.soc.internal);
-    const int32_t is_priced = ((internal > REAL(0.0)) && (mpc_par.polish != 0)) ? 1 : 0;
-    const mpc_real divisor = (is_priced != 0) ? internal : REAL(1.0);
+    const mpc_prices prices = {own + by_row(stage, MPC_ROW_T_CL, MPC_VAR_FUEL, stage->a.t_cl.fuel),
+                               by_row(stage, MPC_ROW_T_CL, MPC_VAR_P_ENG, stage->a.t_cl.p_eng),
+                               by_row(stage, MPC_ROW_SOC, MPC_VAR_INTERNAL, stage->a.soc.internal)};
+    return prices;
+}
+
+mpc_real mpc_polish_power_w(const mpc_state *state, const mpc_prices *prices, mpc_real planned_w)
+{
+    const mpc_real net_w = state->stage[0].road.net_w;
+    const int32_t is_priced = ((prices->internal > REAL(0.0)) && (mpc_par.polish != 0)) ? 1 : 0;
+    const mpc_real divisor = (is_priced != 0) ? prices->internal : REAL(1.0);
     const mpc_real quarter = (mpc_par.plan_voltage_v * mpc_par.plan_voltage_v) / REAL(4.0);
     mpc_real best_w = mpc_par.engine_max_w;
     for (int32_t i = 0; i < MPC_FUEL_PIECES; i++) {
-        const mpc_real priced = ((fuel * FUEL_SLOPE(i)) + p_eng) / divisor;
+        const mpc_real priced = ((prices->fuel * FUEL_SLOPE(i)) + prices->p_eng) / divisor;
         const mpc_real ratio = real_max(priced, LEAST_RATIO);
         const mpc_real resistance = (ratio > REAL(1.0)) ? mpc_par.plan_resistance_discharge_ohm
                                                         : mpc_par.plan_resistance_charge_ohm;

@@ -72,7 +72,8 @@ void mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p_eng
     }
     if (on_share[0] >= real_min(state->cal.on_threshold, STAY_SHARE)) {
         const mpc_real share = real_min(on_share[0], REAL(1.0));
-        p_eng_w[0] = share * mpc_polish_power_w(state, p_eng_w[0] / share);
+        const mpc_prices prices = mpc_polish_prices(state);
+        p_eng_w[0] = share * mpc_polish_power_w(state, &prices, p_eng_w[0] / share);
     }
 }
 

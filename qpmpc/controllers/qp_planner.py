@@ -17,6 +17,7 @@ from qpmpc.preview.stages import Stages
 from qpmpc.pwa.learned_fuel import LearnedFuel
 from qpmpc.pwa.model import PwaModel, learned_fuel
 from qpmpc.qp.expectation import expectation
+from qpmpc.qp.last_run import last_run_w
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.polish import Polish
 from qpmpc.qp.rows import Var
@@ -178,10 +179,16 @@ class QpPlanner(Planner):
         short = slice(self.of_qp.horizon.short_stages)
         on_share = solved.x[short, Var.ON]
         power_w = power_while_on_w(on_share, solved.x[short, Var.P_ENG])
-        if self.of_qp.polish and on_share[0] >= STAY_SHARE:
-            net_w = float(solved.stages.net_w[0])
-            prices = self.qp.prices(solved.duals)
-            power_w[0] = self._polish.power_w(prices, net_w, float(power_w[0]))
+        least_w = self._ramp.least_w(solved.stages.seconds_w(short.stop), seen.soc)
+        if self.of_qp.polish:
+            prices, stages = self.qp.prices(solved.duals), solved.stages
+            if on_share[0] >= STAY_SHARE:
+                net_w = float(stages.net_w[0])
+                power_w[0] = self._polish.power_w(prices, net_w, float(power_w[0]))
+            if seen.engine_on:
+                engine, internal_w = self.trip.vehicle.engine, solved.x[:, Var.INTERNAL]
+                going_w = last_run_w(engine, self._polish, prices, stages, internal_w)
+                least_w = max(least_w, going_w)
         return Plan(
             on_share,
             power_w,
@@ -189,7 +196,7 @@ class QpPlanner(Planner):
             iterations,
             self._relaxation_gap(solved),
             arrival_s=solved.stages.arrival_s(self.of_qp.horizon.short_stages),
-            least_w=self._ramp.least_w(solved.stages.seconds_w(short.stop), seen.soc),
+            least_w=least_w,
             certificate_g=self._certificate(
                 solved.stages, seen, solved.about, solved.x, solved.duals
             ),

@@ -55,7 +55,7 @@ class Polish:
 
     def __init__(self, vehicle: Vehicle, model: PwaModel) -> None:
         maps, soc = BatteryMaps(vehicle.battery), vehicle.trip.soc_mean
-        self._vehicle = vehicle
+        self._vehicle, self._maps = vehicle, maps
         self.learn(model.fuel)
         square = maps.open_circuit.at(soc) ** 2
         self._discharge_w = square / (4.0 * maps.discharge.at(soc))
@@ -64,6 +64,16 @@ class Polish:
     def learn(self, fuel: PwaFit) -> None:
         """Use another fuel curve from now on."""
         self._slope, self._begin_w = fuel.slope, fuel.breakpoints[:-1]
+        self._intercept = fuel.intercept
+
+    def fuel_g_per_s(self, power_w: float) -> float:
+        """Return the fuel rate f(E) of the hot engine."""
+        return float((self._slope * power_w + self._intercept).max())
+
+    def internal_w(self, power_w: float) -> float:
+        """Return the battery's internal power l(P)."""
+        soc = self._vehicle.trip.soc_mean
+        return float(self._maps.internal_power_w(soc, np.array([power_w]))[0])
 
     def power_w(self, prices: Prices, net_w: float, planned_w: float) -> float:
         """Return that power, or `planned_w` where a charge in the battery has no price."""

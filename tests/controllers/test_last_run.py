@@ -1,0 +1,127 @@
+"""A run goes on where the rest of the trip wants less than one more run of the engine."""
+
+import numpy as np
+import pytest
+
+import qpmpc
+from qpmpc.codegen.c_compiler import compiler
+from qpmpc.cycles import Cycle, load_cycle
+from qpmpc.preview.stages import Stages
+from qpmpc.pwa import PwaModel
+from qpmpc.qp.last_run import last_run_w
+from qpmpc.qp.polish import Polish, Prices
+from qpmpc.vehicle import load_vehicle
+
+CAR = load_vehicle()
+POLISH = Polish(CAR, PwaModel.of(CAR))
+# a gram of fuel is worth a gram; a joule in the battery what the engine makes it for, 0.09 g/kJ
+PRICES = Prices(fuel=1.0, p_eng=0.0, internal=9e-5)
+DRIVING_W = 3e3
+
+
+def stages(wanted_j: float, must_share: float = 0.0) -> tuple[Stages, np.ndarray]:
+    """A second of easy driving and a minute to arrival, in which the plan takes some energy."""
+    n = np.array([1.0, 60.0])
+    off_w = POLISH.internal_w(DRIVING_W)
+    same = np.full(2, off_w)
+    net_w = np.full(2, DRIVING_W)
+    must = np.array([0.0, must_share])
+    zero = np.zeros(2)
+    trip = Stages(n, net_w, zero + 8.0, same, must, net_w, same, zero, zero, zero)
+    return trip, same - np.array([0.0, wanted_j / 60.0])
+
+
+def power_w(wanted_j: float, car=CAR, prices=PRICES, must_share: float = 0.0) -> float:
+    trip, internal_w = stages(wanted_j, must_share)
+    return last_run_w(car.engine, POLISH, prices, trip, internal_w)
+
+
+GOING_W = POLISH.power_w(PRICES, DRIVING_W, 0.0)
+GAIN_W = POLISH.internal_w(DRIVING_W) - POLISH.internal_w(DRIVING_W - GOING_W)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "goes_on"), [(0.0, False), (1.9, False), (2.1, True), (3.9, True), (4.1, False)]
+)
+def test_it_goes_on_for_what_would_be_one_more_run(seconds, goes_on) -> None:
+    """Half of the shortest run, 4 s, is the least that a plan starts the engine for."""
+    assert CAR.engine.min_on_s == 4
+    assert power_w(seconds * GAIN_W) == (GOING_W if goes_on else 0.0)
+
+
+def test_not_where_that_is_dearer_than_a_start() -> None:
+    """Free starts, or energy in the battery that is worth little, are no reason to go on."""
+    value = 5e-5
+    cheap = Prices(1.0, 0.0, value)
+    going_w = POLISH.power_w(cheap, DRIVING_W, 0.0)
+    gain_w = POLISH.internal_w(DRIVING_W) - POLISH.internal_w(DRIVING_W - going_w)
+    wanted_j = 3.5 * gain_w
+    dearer_g = (POLISH.fuel_g_per_s(going_w) - value * gain_w) * wanted_j / gain_w
+    assert dearer_g > CAR.engine.start_fuel_g
+    assert power_w(wanted_j, prices=cheap) == 0.0
+    assert power_w(wanted_j, CAR.with_settings({"engine.start_fuel_g": 5.0}), cheap) == going_w
+    free = CAR.with_settings({"engine.start_fuel_g": 0.0, "engine.start_energy_j": 0.0})
+    assert power_w(wanted_j, free) == 0.0
+
+
+def test_not_where_a_second_ahead_has_to_run_anyway() -> None:
+    assert power_w(3.0 * GAIN_W, must_share=0.05) == 0.0
+
+
+def test_not_where_the_plan_wants_heat() -> None:
+    """There a gram of fuel is worth nearly all that it costs as heat."""
+    heating = PRICES._replace(fuel=0.4, internal=0.4 * PRICES.internal)
+    assert POLISH.power_w(heating, DRIVING_W, 0.0) == GOING_W  # only ratios of prices matter to it
+    assert power_w(3.0 * GAIN_W, prices=heating) == 0.0
+
+
+def test_not_for_nothing_beside_a_full_battery() -> None:
+    """A charge that is worth little lets the engine idle: that gives the battery nothing."""
+    idle = Prices(1.0, 0.0, 1e-6)
+    assert POLISH.power_w(idle, DRIVING_W, 0.0) < DRIVING_W
+    assert power_w(10.0, prices=idle) == 0.0
+
+
+SHORT = {
+    "thermal.t_amb_degc": -4.429263,
+    "trip.soc_init": 0.671625,
+    "trip.t_cl_init_degc": 78.745985,
+}
+
+
+def test_a_start_at_standstill_before_the_arrival_is_spared(monkeypatch) -> None:
+    """Seven minutes; without it the last run is one too many."""
+    python = {**SHORT, "mh_qp.implementation": "python"}
+    now = qpmpc.simulate("random-7115-416s", "mh-qp", settings=python)
+    monkeypatch.setattr("qpmpc.controllers.qp_planner.last_run_w", lambda *_: 0.0)
+    before = qpmpc.simulate("random-7115-416s", "mh-qp", settings=python)
+    starts = [int(run.trajectory.started.sum()) for run in (now, before)]
+    assert starts[0] == starts[1] - 1
+    soc_g = 170.0  # of a unit of SOC on trips like this one, dynamic programming's
+    fuel_g = [run.trajectory.fuel_g.sum() - soc_g * run.trajectory.soc[-1] for run in (now, before)]
+    assert fuel_g[1] - fuel_g[0] > 1.5 * CAR.engine.start_fuel_g
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+def test_c_goes_on_as_python_does() -> None:
+    runs = [
+        qpmpc.simulate(
+            "random-7115-416s", "mh-qp", settings={**SHORT, "mh_qp.implementation": made_in}
+        ).trajectory
+        for made_in in ("python", "c")
+    ]
+    np.testing.assert_array_equal(runs[0].engine_on, runs[1].engine_on)
+    np.testing.assert_allclose(runs[0].p_eng_w, runs[1].p_eng_w, rtol=1e-6, atol=1e-3)
+
+
+def test_it_is_left_out_where_the_power_is_not_polished(monkeypatch) -> None:
+    part = Cycle.from_samples("part", np.arange(121), load_cycle("nycc").speed_mps[60:181])
+    for polish in (False, True):
+        asked = []
+        monkeypatch.setattr(
+            "qpmpc.controllers.qp_planner.last_run_w", lambda *_, of=asked: float(of.append(1) or 0)
+        )
+        settings = {"mh_qp.implementation": "python", "mh_qp.polish": polish}
+        run = qpmpc.simulate(part, "mh-qp", settings=settings)
+        assert run.trajectory.engine_on.any()
+        assert bool(asked) is polish
