@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle
@@ -15,8 +15,10 @@ from qpmpc.report.pwa_curves import PwaCurve
 from qpmpc.report.trajectory_csv import trajectory_csv
 from qpmpc.report.trip_set import cycle_csv
 from qpmpc.results import Run
-from qpmpc.vehicle.from_map import MappedVehicle
 from qpmpc.vehicle.parameters import Vehicle
+
+if TYPE_CHECKING:  # importing scipy's interpolation takes a third of a second
+    from qpmpc.vehicle.from_map import MappedVehicle
 
 PLOT_EXTRA = "pip install 'qpmpc-iptm[plot]'"
 
@@ -155,7 +157,7 @@ def write_pwa(vehicle: Vehicle, curves: Sequence[PwaCurve], folder: Path) -> lis
     return _write_picture(file, draw) or [f"{file} written"]
 
 
-def write_engine(mapped: MappedVehicle, fuel: PwaCurve, file: Path) -> list[str]:
+def write_engine(mapped: "MappedVehicle", fuel: PwaCurve, file: Path) -> list[str]:
     """Draw a measured engine; returns remarks."""
 
     def draw() -> bytes:
