@@ -33,7 +33,7 @@ def engine_runs(
 
     With sigma_k the share of the k-th second ahead and b the seconds that a change binds
     (`engine.min_on_s` for a start, `engine.min_off_s` for a stop; at least 1), it is on where
-    sigma_0 >= 1/2, where the ramp asks for power now and where the car is too fast, but
+    sigma_0 >= 1/2, where power is asked for now (`least_w`) and where the car is too fast, but
 
     - it is started only if the mean of sigma over the next b seconds is 1/2 at least and arrival
       is no nearer than b seconds, or if the battery alone cannot drive, the ramp asks for it or
@@ -49,7 +49,8 @@ def engine_runs(
     arrival_s : seconds until the trip ends; None where that is beyond the plan
     seen : the present
     vehicle : gives b
-    least_w : engine power that the ramp asks for now, see `qpmpc.controllers.ramp`
+    least_w : engine power that the ramp or a last run asks for now, see `qpmpc.controllers.ramp`
+        and `qpmpc.qp.last_run`
     fast_s : seconds until the first that is too fast for an engine that is off; None without one
     stay_share : share from which on a run may go on; `STAY_SHARE` where only a start lets one rise
     """
