@@ -4,20 +4,9 @@
  * The same in Python, with the rule: qpmpc/qp/last_run.py.
  */
 #include "mpc_constants.h"
-#include "mpc_learned.h"
 #include "mpc_model.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
-
-/* Fuel rate of the hot engine. */
-static mpc_real fuel_g_per_s(const mpc_state *state, mpc_real power_w)
-{
-    mpc_real rate = (FUEL_SLOPE(0) * power_w) + FUEL_INTERCEPT(0);
-    for (int32_t i = 1; i < MPC_FUEL_PIECES; i++) {
-        rate = real_max(rate, (FUEL_SLOPE(i) * power_w) + FUEL_INTERCEPT(i));
-    }
-    return rate;
-}
 
 mpc_real mpc_last_run_w(const mpc_state *state)
 {
@@ -25,7 +14,8 @@ mpc_real mpc_last_run_w(const mpc_state *state)
     const mpc_prices prices = mpc_polish_prices(state);
     const mpc_real power_w = mpc_polish_power_w(state, &prices, REAL(0.0));
     const mpc_real gain_w = now->internal_off_w - mpc_map_planned_internal_w(now->net_w - power_w);
-    const mpc_real spent = (prices.fuel * fuel_g_per_s(state, power_w)) + (prices.p_eng * power_w);
+    const mpc_real spent = (prices.fuel * mpc_qp_least_fuel(state, power_w, REAL(1.0)))
+                           + (prices.p_eng * power_w);
     const mpc_real dearer = spent - (prices.internal * gain_w);
     mpc_real wanted_j = REAL(0.0);
     mpc_real must_s = REAL(0.0);

@@ -49,8 +49,10 @@ int32_t mpc_method_finish(mpc_state *state, int32_t solved);
 void mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p_eng_w);
 void mpc_method_report(const mpc_state *state, mpc_out *out);
 
-/* mpc_qp.c: values of the quadratic program */
+/* mpc_qp.c: values of the quadratic program. mpc_qp_least_fuel: least fuel rate of the hot engine that
+ * it allows at a mean power and an on-share. */
 void mpc_qp_update(mpc_state *state);
+mpc_real mpc_qp_least_fuel(const mpc_state *state, mpc_real p_eng_w, mpc_real on);
 mpc_real mpc_qp_relaxation_gap(const mpc_state *state);
 
 /* mpc_polish.c: the first second at the plan's prices. mpc_polish_power_w: its engine power, of a plan

@@ -180,7 +180,7 @@ class QpPlanner(Planner):
         on_share = solved.x[short, Var.ON]
         power_w = power_while_on_w(on_share, solved.x[short, Var.P_ENG])
         least_w = self._ramp.least_w(solved.stages.seconds_w(short.stop), seen.soc)
-        if self.of_qp.polish:
+        if self.of_qp.polish and (seen.engine_on or on_share[0] >= STAY_SHARE):
             prices, stages = self.qp.prices(solved.duals), solved.stages
             if on_share[0] >= STAY_SHARE:
                 net_w = float(stages.net_w[0])

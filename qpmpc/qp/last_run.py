@@ -55,7 +55,7 @@ def last_run_w(
     gain_w = float(stages.internal_off_w[0]) - polish.internal_w(net_w - power_w)
     if gain_w < LEAST_GAIN_W or prices.fuel < FUEL_LEAST:
         return 0.0
-    fuel_g_per_s = polish.fuel_g_per_s(power_w)
+    fuel_g_per_s = float(polish.fuel(power_w))
     dearer = prices.fuel * fuel_g_per_s + prices.p_eng * power_w - prices.internal * gain_w
     wanted_s = float((stages.duration_s * (stages.internal_off_w - internal_w)).sum()) / gain_w
     is_one_run = WANTED_LEAST * engine.min_on_s <= wanted_s <= engine.min_on_s

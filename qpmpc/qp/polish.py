@@ -51,6 +51,10 @@ class Polish:
     Parameters
     ----------
     vehicle, model : of the QP
+
+    Attributes
+    ----------
+    fuel : f, as it is known now
     """
 
     def __init__(self, vehicle: Vehicle, model: PwaModel) -> None:
@@ -63,12 +67,7 @@ class Polish:
 
     def learn(self, fuel: PwaFit) -> None:
         """Use another fuel curve from now on."""
-        self._slope, self._begin_w = fuel.slope, fuel.breakpoints[:-1]
-        self._intercept = fuel.intercept
-
-    def fuel_g_per_s(self, power_w: float) -> float:
-        """Return the fuel rate f(E) of the hot engine."""
-        return float((self._slope * power_w + self._intercept).max())
+        self.fuel = fuel
 
     def internal_w(self, power_w: float) -> float:
         """Return the battery's internal power l(P)."""
@@ -80,10 +79,10 @@ class Polish:
         if not prices.internal > 0.0:
             return planned_w
         vehicle, engine = self._vehicle, self._vehicle.engine
-        ratio = (prices.fuel * self._slope + prices.p_eng) / prices.internal
+        ratio = (prices.fuel * self.fuel.slope + prices.p_eng) / prices.internal
         ratio = np.maximum(ratio, LEAST_RATIO)
         most_w = np.where(ratio > 1.0, self._discharge_w, self._charge_w)
         best_w = net_w - most_w * (1.0 - 1.0 / ratio**2)
         low_w = max(engine.power_min_w, net_w - vehicle.battery_discharge_max_w)
         high_w = max(min(engine.power_max_w, net_w + vehicle.battery_charge_max_w), low_w)
-        return min(max(float(np.maximum(best_w, self._begin_w).min()), low_w), high_w)
+        return min(max(float(np.maximum(best_w, self.fuel.breakpoints[:-1]).min()), low_w), high_w)

@@ -56,7 +56,7 @@ def test_not_where_that_is_dearer_than_a_start() -> None:
     going_w = POLISH.power_w(cheap, DRIVING_W, 0.0)
     gain_w = POLISH.internal_w(DRIVING_W) - POLISH.internal_w(DRIVING_W - going_w)
     wanted_j = 3.5 * gain_w
-    dearer_g = (POLISH.fuel_g_per_s(going_w) - value * gain_w) * wanted_j / gain_w
+    dearer_g = (float(POLISH.fuel(going_w)) - value * gain_w) * wanted_j / gain_w
     assert dearer_g > CAR.engine.start_fuel_g
     assert power_w(wanted_j, prices=cheap) == 0.0
     assert power_w(wanted_j, CAR.with_settings({"engine.start_fuel_g": 5.0}), cheap) == going_w
