@@ -2,9 +2,10 @@
  * demand class, over the trip beyond the short horizon.
  *
  * A start adds up the whole trip; each second then subtracts the one that the short horizon has
- * reached. Rounding errors are carried along (Knuth's TwoSum), so that a sum of thousands of
- * seconds that shrinks to a single one keeps the digits of that one. A compiler that is allowed to
- * reorder sums (-ffast-math) would undo this.
+ * reached, and hands over the first second of a block to the block before it where their bound moves
+ * on. Rounding errors are carried along (Knuth's TwoSum), so that a sum of thousands of seconds that
+ * shrinks to a single one keeps the digits of that one. A compiler that is allowed to reorder sums
+ * (-ffast-math) would undo this.
  */
 #include "mpc_forecast.h"
 #include "mpc_battery_side.h"
@@ -39,12 +40,27 @@ static int32_t class_of(mpc_real demand_w)
 #endif
 }
 
-/* Add one second of the trip to its block and class, or subtract it: times 1 or -1. */
-static void count(mpc_forecast *forecast, int32_t second, int32_t times)
+/* First second of a block, if the short horizon ends before `first`; of the block after the last
+ * that after the trip. See HorizonSettings.edges in Python. */
+static int32_t edge_of(const mpc_forecast *forecast, int32_t first, int32_t block)
+{
+#if MPC_BLOCK_S > 0
+    const int32_t at = block * MPC_BLOCK_S;
+    const int32_t edge = (at > first) ? at : first;
+#else
+    const int32_t even = (block * (forecast->covered - first)) / MPC_BLOCKS;
+    const int32_t least = block * MPC_SHORT;
+    const int32_t edge = first + ((even > least) ? even : least);
+#endif
+    return (edge < forecast->covered) ? edge : forecast->covered;
+}
+
+/* Add one second of the trip to its class in a block, or subtract it: times 1 or -1. */
+static void count(mpc_forecast *forecast, int32_t of_block, int32_t second, int32_t times)
 {
     const mpc_real demand_w = forecast->trip.demand_w[second];
     const mpc_real net_w = battery_side_w(demand_w);
-    mpc_class_sums *const block = &forecast->ahead[(second / forecast->block_s) * MPC_CLASSES];
+    mpc_class_sums *const block = &forecast->ahead[of_block * MPC_CLASSES];
     const int32_t of_class = class_of(demand_w);
     mpc_class_sums *const to = &block[of_class];
     const mpc_real sign = (mpc_real)times;
@@ -66,7 +82,17 @@ static void count(mpc_forecast *forecast, int32_t second, int32_t times)
     add_to(&to->free_internal_off_w, if_free * off_w);
 }
 
-static void sum_up(mpc_forecast *forecast)
+/* The same for some seconds, up to `end`. */
+static void count_all(mpc_forecast *forecast, int32_t of_block, int32_t start, int32_t end,
+                      int32_t times)
+{
+    for (int32_t second = start; second < end; second++) {
+        count(forecast, of_block, second, times);
+    }
+}
+
+/* All that is beyond the short horizon. */
+static void sum_up(mpc_forecast *forecast, int32_t first)
 {
     static const mpc_class_sums none = {0,
                                         0,
@@ -79,10 +105,11 @@ static void sum_up(mpc_forecast *forecast)
     for (int32_t k = 0; k < MPC_LONG; k++) {
         forecast->ahead[k] = none;
     }
-    for (int32_t second = 0; second < forecast->covered; second++) {
-        count(forecast, second, 1);
+    for (int32_t block = 0; block < MPC_BLOCKS; block++) {
+        count_all(forecast, block, edge_of(forecast, first, block),
+                  edge_of(forecast, first, block + 1), 1);
     }
-    forecast->next = 0;
+    forecast->next = first;
 }
 
 /* Internal battery power with the engine off. */
@@ -91,13 +118,13 @@ static mpc_real drained_w(mpc_real demand_w)
     return mpc_map_planned_internal_w(battery_side_w(demand_w));
 }
 
-/* How far the battery's energy falls below where a block begins and rises above where it ends, if
- * the engine makes up evenly in hard driving for all the rest; everywhere in a block without any.
+/* How far the battery's energy falls below where a place begins and rises above where it ends, if
+ * the engine makes up evenly in hard driving for all the rest; everywhere in a place without any.
  * An engine at rest is the least: a descent ends above. */
 static mpc_swing swing_of(const mpc_forecast *forecast, int32_t first)
 {
-    const int32_t end = ((first + forecast->block_s) < forecast->covered)
-                            ? (first + forecast->block_s)
+    const int32_t end = ((first + forecast->place_s) < forecast->covered)
+                            ? (first + forecast->place_s)
                             : forecast->covered;
     mpc_sum drained = {REAL(0.0), REAL(0.0)};
     mpc_sum drained_hard = {REAL(0.0), REAL(0.0)};
@@ -136,7 +163,7 @@ static mpc_real most_kept_j(void)
     return FILLED_SHARE * room * mpc_par.battery_energy_j;
 }
 
-/* At the end of each block: a share of the swing in it and in the next, at most half of the room
+/* At the end of each place: a share of the swing in it and in the next, at most half of the room
  * between the limits and at least something, by which the end of a block is known. An averaged
  * preview knows nothing of the swing. */
 static void find_swings(mpc_forecast *forecast)
@@ -144,9 +171,9 @@ static void find_swings(mpc_forecast *forecast)
     const mpc_real most_j = most_kept_j();
     const mpc_real share = (MPC_CLASSES > 1) ? mpc_par.swing_share : REAL(0.0);
     mpc_swing next = {REAL(0.0), REAL(0.0)};
-    for (int32_t block = MPC_BLOCKS - 1; block >= 0; block--) {
-        const mpc_swing own = swing_of(forecast, block * forecast->block_s);
-        mpc_swing *const kept = &forecast->swing[block];
+    for (int32_t place = MPC_BLOCKS - 1; place >= 0; place--) {
+        const mpc_swing own = swing_of(forecast, place * forecast->place_s);
+        mpc_swing *const kept = &forecast->swing[place];
         kept->fall_j =
             real_max(real_min(share * real_max(own.fall_j, next.fall_j), most_j), LEAST_KEPT_J);
         kept->rise_j =
@@ -233,14 +260,15 @@ int32_t mpc_forecast_start(mpc_forecast *forecast, const mpc_road *trip)
     }
     const int32_t steps = forecast->trip.steps;
 #if MPC_BLOCK_S > 0
-    const int32_t block_s = MPC_BLOCK_S;
+    const int32_t place_s = MPC_BLOCK_S;
 #else
-    const int32_t block_s = (steps + (MPC_BLOCKS - 1)) / MPC_BLOCKS;
+    const int32_t place_s = (steps + (MPC_BLOCKS - 1)) / MPC_BLOCKS;
 #endif
-    const int32_t held = block_s * MPC_BLOCKS;
-    forecast->block_s = block_s;
+    const int32_t held = place_s * MPC_BLOCKS;
+    forecast->place_s = place_s;
     forecast->covered = (steps < held) ? steps : held;
-    sum_up(forecast);
+    /* where the first second will ask for it */
+    sum_up(forecast, (MPC_SHORT < forecast->covered) ? MPC_SHORT : forecast->covered);
     find_swings(forecast);
     find_rooms(forecast);
     return (fine != 0) ? 0 : -1;
@@ -254,19 +282,28 @@ static int32_t is_started(const mpc_forecast *forecast)
     fine &= ((trip->steps >= 0) && (trip->steps <= MPC_LONGEST_TRIP_S)) ? 1 : 0;
     fine &= ((forecast->covered >= 0) && (forecast->covered <= trip->steps)) ? 1 : 0;
     fine &= ((forecast->next >= 0) && (forecast->next <= forecast->covered)) ? 1 : 0;
-    fine &= ((forecast->block_s >= 0) && (forecast->block_s <= MPC_LONGEST_TRIP_S)) ? 1 : 0;
-    return ((fine != 0) && (forecast->covered <= (forecast->block_s * MPC_BLOCKS))) ? 1 : 0;
+    fine &= ((forecast->place_s >= 0) && (forecast->place_s <= MPC_LONGEST_TRIP_S)) ? 1 : 0;
+    return ((fine != 0) && (forecast->covered <= (forecast->place_s * MPC_BLOCKS))) ? 1 : 0;
 }
 
-/* Keep in the sums only the seconds from `from` on. */
+/* Move the bounds of the blocks on: what is beyond the short horizon begins at `from` now. */
 static void leave_from(mpc_forecast *forecast, int32_t from)
 {
-    if (from < forecast->next) {
-        sum_up(forecast); /* the caller's time has gone back */
-    }
-    while ((forecast->next < from) && (forecast->next < forecast->covered)) {
-        count(forecast, forecast->next, -1);
-        forecast->next++;
+    const int32_t old = forecast->next;
+    const int32_t ahead = (from > 0) ? from : 0;
+    const int32_t first = (ahead < forecast->covered) ? ahead : forecast->covered;
+    if (first < old) {
+        sum_up(forecast, first); /* the caller's time has gone back */
+    } else {
+        for (int32_t block = 0; block < MPC_BLOCKS; block++) {
+            const int32_t old_start = edge_of(forecast, old, block);
+            const int32_t old_end = edge_of(forecast, old, block + 1);
+            const int32_t start = edge_of(forecast, first, block);
+            const int32_t end = edge_of(forecast, first, block + 1);
+            count_all(forecast, block, old_start, (start < old_end) ? start : old_end, -1);
+            count_all(forecast, block, (old_end > start) ? old_end : start, end, 1);
+        }
+        forecast->next = first;
     }
 }
 
@@ -277,6 +314,18 @@ static void fill_short(const mpc_road *seen, mpc_in *in)
         in->short_demand_w[k] = (ahead != 0) ? seen->demand_w[k] : REAL(0.0);
         in->short_speed_mps[k] = (ahead != 0) ? seen->speed_mps[k] : REAL(0.0);
     }
+}
+
+/* What is kept at the end of a block: that of the place where it ends; nothing, if it is empty. */
+static mpc_swing kept_of(const mpc_forecast *forecast, int32_t block, int32_t is_arriving)
+{
+    const int32_t start = edge_of(forecast, forecast->next, block);
+    const int32_t end = edge_of(forecast, forecast->next, block + 1);
+    mpc_swing kept = {REAL(0.0), REAL(0.0)};
+    if ((is_arriving == 0) && (start < end)) {
+        kept = forecast->swing[(end - 1) / forecast->place_s];
+    }
+    return kept;
 }
 
 static void fill_long(const mpc_forecast *forecast, int32_t is_arriving, mpc_in *in)
@@ -290,14 +339,9 @@ static void fill_long(const mpc_forecast *forecast, int32_t is_arriving, mpc_in 
         in->long_net_w[k] = share * mean_of(&of->net_w, seconds);
         in->long_speed_mps[k] = share * mean_of(&of->speed_mps, seconds);
         in->long_rises[k] = (is_arriving != 0) ? REAL(0.0) : (mpc_real)of->rises;
-        const mpc_swing *const swing = &forecast->swing[k / MPC_CLASSES];
-        const int32_t block_s = (is_arriving != 0) ? 0 : forecast->block_s;
-        const int32_t first = (k / MPC_CLASSES) * block_s;
-        const int32_t after = first + block_s;
-        const int32_t end = (after < forecast->covered) ? after : forecast->covered;
-        const int32_t is_ahead = ((first < end) && (forecast->next < end)) ? 1 : 0;
-        in->long_fall_j[k] = (is_ahead != 0) ? swing->fall_j : REAL(0.0);
-        in->long_rise_j[k] = (is_ahead != 0) ? swing->rise_j : REAL(0.0);
+        const mpc_swing swing = kept_of(forecast, k / MPC_CLASSES, is_arriving);
+        in->long_fall_j[k] = swing.fall_j;
+        in->long_rise_j[k] = swing.rise_j;
         /* with one class the preview is averaged: it has only the mean demand */
 #if MPC_CLASSES > 1
         in->long_internal_off_w[k] = share * mean_of(&of->internal_off_w, seconds);

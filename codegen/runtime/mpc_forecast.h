@@ -62,16 +62,16 @@ typedef struct {
 typedef struct {
     uint32_t magic; /* tells a started forecast from any other memory, as does magic_end */
     mpc_road trip;
-    int32_t block_s;
-    int32_t covered; /* seconds of the trip in the blocks */
-    int32_t next;    /* first second that is still in the sums */
+    int32_t place_s; /* length of each of as many fixed places as there are blocks */
+    int32_t covered; /* seconds of the trip in them */
+    int32_t next;    /* first second that is in the sums, where the first block begins */
     mpc_class_sums ahead[MPC_LONG];
-    mpc_swing swing[MPC_BLOCKS]; /* kept from the SOC limits at the end of each block */
+    mpc_swing swing[MPC_BLOCKS]; /* kept from the SOC limits at the end of each place */
     mpc_real room_j[MPC_ROOMS];  /* for the braking from each of them on */
     uint32_t magic_end;
 } mpc_forecast;
 
-/* Take a forecast of the whole trip, from departure to arrival; its length sets the blocks.
+/* Take a forecast of the whole trip, from departure to arrival; its length sets the places.
  *
  * Returns 0, or -1 if the trip has no second or more than MPC_LONGEST_TRIP_S, or a value that
  * mpc_step would refuse. Then the long horizon stays empty. It may be called again under way, with

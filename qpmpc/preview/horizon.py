@@ -2,6 +2,8 @@
 
 from typing import Annotated, Literal, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from qpmpc.errors import InputError
@@ -16,9 +18,10 @@ class HorizonSettings(BaseModel):
     Attributes
     ----------
     short_stages : N stages of 1 s with accurate preview
-    blocks : number of equal blocks that the trip is cut into at departure, or
-    block_s : length of a block, s; used when `blocks` is 0. With both 0 there is no long horizon:
-        the short one recedes to arrival
+    blocks : number of equal blocks into which what is ahead beyond the short horizon is cut, every
+        second anew; none is shorter than the short horizon. Or
+    block_s : length of a block, s, at its own place on the trip; used when `blocks` is 0. With both
+        0 there is no long horizon: the short one recedes to arrival
     classes : 3 demand classes per block (hard, easy, braking) or 1 (the mean, as in the paper)
     class_hard_w, class_braking_w : demand above the first is hard, below the second braking
     swing_share : share of the swing that an engine in hard driving leads to, by which the SOC
@@ -54,9 +57,39 @@ class HorizonSettings(BaseModel):
             found |= {"class_hard_w", "class_braking_w", "swing_share", "rise_share"}
         return found
 
-    def block_length_s(self, trip_steps: int) -> int:
-        """Length of a block for a trip of that many 1 s steps, 0 if there are none."""
+    def place_s(self, trip_steps: int) -> int:
+        """Length of a place for a trip of that many 1 s steps, 0 if there are no blocks.
+
+        The trip has as many places as blocks. They stay where they are, to tell what the battery
+        swings there (`qpmpc.preview.swing`); blocks with a length of their own are these places.
+        """
         return -(-trip_steps // self.blocks) if self.blocks else self.block_s
+
+    def edges(self, first: int, trip_steps: int) -> NDArray[np.intp]:
+        """First second of each block beyond the short horizon, and the second after the last.
+
+        With n blocks and r seconds left, block k begins
+
+            min(max(floor(k r / n), k N), r)   or, with a length b of their own,   k b
+
+        from `first` or from departure, and no block begins before `first`. A boundary never goes
+        back and passes no more seconds than `first` does, so that a block hands its first seconds
+        over to the one before it, and its slot goes on with nearly the same statistics.
+
+        Parameters
+        ----------
+        first : second of the trip at which the short horizon ends
+        trip_steps : of 1 s
+
+        Returns
+        -------
+        shape (blocks + 1,)
+        """
+        k = np.arange(self.block_count(trip_steps) + 1)
+        if not self.blocks:
+            return np.clip(k * self.block_s, first, trip_steps)
+        left = trip_steps - first
+        return first + np.minimum(np.maximum(k * left // self.blocks, k * self.short_stages), left)
 
     def block_count(self, trip_steps: int) -> int:
         """Number of blocks for a trip of that many 1 s steps; the last may be empty.
@@ -70,7 +103,7 @@ class HorizonSettings(BaseModel):
         """
         if self.blocks:
             return self.blocks
-        length_s = self.block_length_s(trip_steps)
+        length_s = self.place_s(trip_steps)
         count = -(-trip_steps // length_s) if length_s else 0
         if count > BLOCKS_MAX:
             raise InputError(

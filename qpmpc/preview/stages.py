@@ -111,9 +111,10 @@ class StageBuilder:
     """Cuts a trip into stages at any time step.
 
     Slots are fixed from departure to arrival: the first N are the next N seconds, then each block
-    of the trip has one slot per demand class, at its own absolute place. A block that has passed,
-    or that the short horizon covers, has duration 0. So a long stage keeps its slot, and primal
-    and dual variables can be carried from step to step by identity.
+    beyond them has one slot per demand class. The bounds of blocks move on with the car
+    (`HorizonSettings.edges`), no faster than it drives: a slot goes on from second to second with
+    nearly the same statistics, and primal and dual variables are carried by slot. An empty block
+    has duration 0.
 
     The forecast is read at the car's place on its route (`qpmpc.preview.place`) and may be wrong
     about the trip's length. A trip that outlasts it goes on with the short horizon alone, and the
@@ -141,29 +142,26 @@ class StageBuilder:
         demand_class = _demand_class(forecast.demand_w, settings)
         self._cumulative = _cumulative(forecast, vehicle, demand_class, settings.classes)
         self._cumulative_rises = _cumulative_rises(demand_class, settings.classes)
-        block_s = settings.block_length_s(forecast.steps)
         self.count = settings.stage_count(forecast.steps)
-        start = np.arange(settings.block_count(forecast.steps)) * block_s
-        self._block_start = np.minimum(start, forecast.steps)
-        self._block_end = np.minimum(start + block_s, forecast.steps)
-        self._swing_j = swings(forecast, vehicle, settings, self._block_start, self._block_end)
+        self._forecast_steps = forecast.steps
+        self._place_s = settings.place_s(forecast.steps)
+        start = np.arange(settings.block_count(forecast.steps)) * self._place_s
+        start = np.minimum(start, forecast.steps)
+        end = np.minimum(start + self._place_s, forecast.steps)
+        self._swing_j = swings(forecast, vehicle, settings, start, end)
         self._room_j = rooms(forecast, vehicle, settings)
 
     def preview(self, step: int) -> Preview:
         """Return the trip ahead from time step `step`; short_count is 0 after arrival."""
         n = self.settings.short_stages
         now = min(max(step, 0), self.steps)
-        start = self._long_start(now)
-        fields = self._long_fields(start)
-        rises = self._cumulative_rises[:, self._block_end] - self._cumulative_rises[:, start]
-        swing_j = np.repeat(
-            self._swing_j * (start < self._block_end), self.settings.classes, axis=1
-        )
+        edges = self._edges(now)
+        rises = np.diff(self._cumulative_rises[:, edges], axis=1)
         return Preview(
             self._demand_w[now : now + n],
             self._speed_mps[now : now + n],
             min(n, self.steps - now),
-            Stages(*np.vstack([fields, rises.T.ravel(), swing_j])),
+            Stages(*np.vstack([self._long_fields(edges), rises.T.ravel(), self._kept_j(edges)])),
             0.0 if self._arrives(now) else float(self._room_j[self.beyond(now)]),
         )
 
@@ -215,12 +213,15 @@ class StageBuilder:
         swing_j[:, n:] = np.where(ends_block, (long.fall_j, long.rise_j), -NO_LIMIT_J)
         return Stages(*np.vstack([fields, rises, swing_j]))
 
-    def _long_start(self, step: int) -> NDArray[np.intp]:
-        """First second of each block beyond the short horizon; its end where there is none."""
-        if self._arrives(step):
-            return self._block_end
-        start: NDArray[np.intp] = np.clip(self.beyond(step), self._block_start, self._block_end)
-        return start
+    def _edges(self, step: int) -> NDArray[np.intp]:
+        """Bounds of the blocks beyond the short horizon of a time step, which are empty at arrival.
+
+        Returns
+        -------
+        shape (blocks + 1,), see `HorizonSettings.edges`
+        """
+        first = self._forecast_steps if self._arrives(step) else self.beyond(step)
+        return self.settings.edges(first, self._forecast_steps)
 
     def _arrives(self, step: int) -> bool:
         """Whether the short horizon reaches the arrival."""
@@ -230,10 +231,20 @@ class StageBuilder:
         """Return the first second of the forecast beyond the short horizon of a time step."""
         return int(self._forecast_second[min(step + self.settings.short_stages, self.steps)])
 
-    def _long_fields(self, start: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Fields of the long stages, from those seconds on; shape (FIELDS, blocks * classes)."""
+    def _kept_j(self, edges: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Kept from the SOC limits at the end of each block: that of the place where it ends.
+
+        Returns
+        -------
+        fall and rise, shape (2, blocks * classes); 0 of an empty block
+        """
+        kept_j = self._swing_j[:, np.maximum(edges[1:] - 1, 0) // max(self._place_s, 1)]
+        return np.repeat(kept_j * (np.diff(edges) > 0), self.settings.classes, axis=1)
+
+    def _long_fields(self, edges: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Fields of the long stages between those bounds; shape (FIELDS, blocks * classes)."""
         # (classes, FIELDS, blocks) -> fields of the long stages, block by block, class by class
-        sums = self._cumulative[:, :, self._block_end] - self._cumulative[:, :, start]
+        sums = np.diff(self._cumulative[:, :, edges], axis=2)
         fields = sums.transpose(1, 2, 0).reshape(FIELDS, -1)
         fields[1:] /= np.maximum(fields[0], 1.0)
         if self.settings.classes == 1:  # an averaged preview has only the mean demand

@@ -3,7 +3,8 @@
 Inside a long block braking fills the battery and launches drain it. A plan that knows only where
 the block ends would end it at a limit; on the road the braking energy is then thrown away. So two
 numbers of each block's end go with its statistics: how far below and above it the battery's energy
-comes, there and before the block's own end. A third goes with the short horizon, second by second:
+comes around there. They are found once, for as many fixed places of the trip as it has blocks, and
+a block has those of the place where it ends. A third goes with the short horizon, second by second:
 the room that the braking beyond it needs.
 """
 
@@ -35,16 +36,16 @@ def swings(
     start: NDArray[np.intp],
     end: NDArray[np.intp],
 ) -> Floats:
-    """Energy to keep from the lower and from the upper SOC limit at the end of each block, J.
+    """Energy to keep from the lower and from the upper SOC limit at the end of each place, J.
 
-    With l the internal power with the engine off, from the start of a block to each t in it,
+    With l the internal power with the engine off, from the start of a place to each t in it,
 
         path(t) = sum of -l outside hard driving, and of a constant in hard driving (everywhere,
                   where there is none) with which the path ends where it began; but no engine
                   takes, so it is at least that of an engine at rest, and a descent ends above
 
     is what an engine leads to that runs in hard driving. It can be run so that the battery swings
-    less: of block b and the next, which begins there, a share s is kept,
+    less: of place b and the next, which begins there, a share s is kept,
 
         fall_b = s max(fall of path_b, fall of path_b+1),   fall of path = -min path
         rise_b = s max(rise of path_b, rise of path_b+1),   rise of path = max path - max(end, 0)
@@ -55,11 +56,11 @@ def swings(
     Parameters
     ----------
     forecast : of the whole trip
-    start, end : first second of each block and that after its last, shape (blocks,)
+    start, end : first second of each place and that after its last, shape (places,)
 
     Returns
     -------
-    fall and rise, shape (2, blocks)
+    fall and rise, shape (2, places)
     """
     if settings.classes == 1 or not len(start):
         return np.full((2, len(start)), LEAST_KEPT_J)
@@ -110,7 +111,7 @@ def _most_j(vehicle: Vehicle) -> float:
 
 
 def _swing(flow_w: Floats, is_hard: NDArray[np.bool_]) -> tuple[float, float]:
-    """Largest fall and rise of `path` in one block of 1 s steps, J."""
+    """Largest fall and rise of `path` in one place of 1 s steps, J."""
     if not len(flow_w):
         return 0.0, 0.0
     repaid = is_hard if is_hard.any() else np.ones_like(is_hard)

@@ -70,11 +70,10 @@ def test_rises_are_those_of_the_demand_beyond_the_short_horizon(step, short, blo
     layout = HorizonSettings(short_stages=short, blocks=blocks)
     builder = StageBuilder(VEHICLE, NYCC, NYCC, layout)
     found = builder.preview(step).long.rises.reshape(blocks, 3)
-    length = layout.block_length_s(NYCC.steps)
+    edges = layout.edges(min(step + short, NYCC.steps), NYCC.steps)
     demand = NYCC.demand_w
     for block in range(blocks):
-        inside = range(max(step + short, block * length), min((block + 1) * length, NYCC.steps))
-        inside = inside if step + short < NYCC.steps else range(0)
+        inside = range(edges[block], edges[block + 1])
         hard = sum(demand[t - 1] <= layout.class_hard_w < demand[t] for t in inside)
         easy = sum(demand[t - 1] < layout.class_braking_w <= demand[t] for t in inside)
         assert list(found[block]) == [hard, easy, 0.0]
@@ -98,9 +97,9 @@ def test_means_of_the_seconds_with_a_choice_are_those_of_their_seconds(classes):
     net, off = trace.battery_side_w(car), trace.internal_off_w(car)
     must = must_run(car, net, trace.speed_mps)
     long = builder.preview(0).long
-    length, mixed = layout.block_length_s(trace.steps), 0
+    edges, mixed = layout.edges(layout.short_stages, trace.steps), 0
     for block in range(layout.blocks):
-        seconds = np.arange(max(block * length, 20), min((block + 1) * length, trace.steps))
+        seconds = np.arange(edges[block], edges[block + 1])
         hard = trace.demand_w[seconds] > layout.class_hard_w
         braking = trace.demand_w[seconds] < layout.class_braking_w
         for number, member in enumerate((hard, ~hard & ~braking, braking)[:classes]):
@@ -146,8 +145,36 @@ def test_shift_moves_short_stages_up_and_keeps_long_ones():
     assert source[4:] == list(range(4, builder.count))
 
 
-def test_a_block_length_covers_the_trip():
+@settings(max_examples=200, deadline=None)
+@given(
+    first=st.integers(0, 2000),
+    left=st.integers(0, 2000),
+    blocks=st.integers(1, 40),
+    short=st.integers(1, 60),
+    passed=st.integers(0, 3),
+)
+def test_blocks_share_out_what_is_ahead_and_none_is_short(first, left, blocks, short, passed):
+    layout = HorizonSettings(short_stages=short, blocks=blocks)
+    edges = layout.edges(first, first + left)
+    assert edges[0] == first
+    assert edges[-1] == first + left
+    long_s = np.diff(edges)
+    full = long_s[long_s > 0][:-1]  # all but the last, which holds what is left
+    assert np.all(full >= short)
+    assert np.ptp(long_s) <= 1 or np.all(full <= max(short, -(-left // blocks)))
+    later = layout.edges(min(first + passed, first + left), first + left)
+    assert np.all((later - edges >= 0) & (later - edges <= passed))  # no faster than the car
+
+
+def test_blocks_of_a_length_stay_at_their_place():
+    layout = HorizonSettings(blocks=0, block_s=100)
+    assert layout.edges(20, 350).tolist() == [20, 100, 200, 300, 350]
+    assert layout.edges(150, 350).tolist() == [150, 150, 200, 300, 350]
+    assert layout.edges(350, 350).tolist() == 5 * [350]
+
+
+def test_places_cover_the_trip():
     for steps in (1, 7, 598, 790, 1800):
         layout = HorizonSettings()
-        assert layout.block_count(steps) * layout.block_length_s(steps) >= steps
+        assert layout.block_count(steps) * layout.place_s(steps) >= steps
         assert layout.block_count(steps) <= layout.blocks

@@ -113,11 +113,12 @@ def test_soc_is_limited_at_the_ends_of_blocks_that_lie_ahead(step, short, blocks
     layout = HorizonSettings(short_stages=short, blocks=blocks)
     builder = StageBuilder(CAR, NYCC, NYCC, layout)
     stages = builder.at(step)
-    length = layout.block_length_s(NYCC.steps)
+    length = layout.place_s(NYCC.steps)
     start = np.minimum(np.arange(blocks) * length, NYCC.steps)
     end = np.minimum(start + length, NYCC.steps)
-    of_end = swings(NYCC, CAR, layout, start, end)
-    ahead = (end > step + short) & (start < end) & (step + short < NYCC.steps)
+    edges = layout.edges(min(step + short, NYCC.steps), NYCC.steps)
+    of_end = swings(NYCC, CAR, layout, start, end)[:, (edges[1:] - 1) // length]
+    ahead = np.diff(edges) > 0
     room_j = rooms(NYCC, CAR, layout)[step + short] if step + short < NYCC.steps else 0.0
     of_seconds = np.zeros((2, short))  # which are known one by one, but not what comes then
     of_seconds[1, -1] = room_j
@@ -184,7 +185,7 @@ def blocks_of(*demands: list[float]) -> StageBuilder:
     demand = np.concatenate([[EASY_W, EASY_W], *demands])
     assert len(demand) % 4 == 0
     trace = Trace(demand, np.full(len(demand), 10.0))
-    layout = HorizonSettings(short_stages=2, blocks=len(demand) // 4, swing_share=1.0)
+    layout = HorizonSettings(short_stages=2, blocks=0, block_s=4, swing_share=1.0)
     return StageBuilder(CAR, trace, trace, layout)
 
 
