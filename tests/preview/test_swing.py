@@ -177,7 +177,8 @@ def test_descents_inside_a_block_find_room_in_a_small_battery(controller, of) ->
         settings={"trip.soc_init": 0.7, f"{of}.horizon.blocks": 2},
     )
     assert run.summary()["friction_brake_j"] < 1e3
-    assert run.trajectory.soc.max() > 0.79  # it needs all the room that there is
+    # it needs most of the room that there is: 0.8 is the limit; the more, the later it makes some
+    assert run.trajectory.soc.max() > 0.78
 
 
 def blocks_of(*demands: list[float]) -> StageBuilder:

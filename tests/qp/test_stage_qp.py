@@ -191,7 +191,8 @@ def test_ends_of_blocks_keep_a_reserve_of_charge_more_where_the_thermostat_opens
     share = 0.5 if t_cl_degc > VEHICLE.thermal.thermostat_open_degc else 0.25
     ends = (np.arange(qp.stages) - BUILDER.settings.short_stages) % 3 == 2
     ends[: BUILDER.settings.short_stages] = False
-    reserved = np.where(ends, share * (trip.soc_init - battery.soc_min), 0.0)
+    wanted = share * (trip.soc_init - battery.soc_min) - stages.refill_j / MODEL.battery_energy_j
+    reserved = np.where(ends, np.maximum(wanted, 0.0), 0.0)
     swing = stages.fall_j / MODEL.battery_energy_j
     expected = np.maximum(battery.soc_min + swing, -1.0) + reserved  # -1: none
     assert planned[:-1] == pytest.approx(expected[:-1])

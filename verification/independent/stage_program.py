@@ -52,8 +52,9 @@ def horizon(
 
     For `held_s` of the coming seconds an engine that runs has to go on.
 
-    The next N seconds one by one; then the rest of each block after those, split into hard, easy
-    and braking seconds. On from the hard to the easy seconds of a block the engine stops, and
+    The next N seconds one by one; then what is left, in equal blocks, or in blocks of N seconds
+    where that is more; each split into hard, easy and braking seconds.
+    On from the hard to the easy seconds of a block the engine stops, and
     starts again, as often as the demand rises into the hard ones; likewise from easy to braking.
     """
     grid, equations = settings.horizon, Equations(vehicle)
@@ -63,7 +64,7 @@ def horizon(
     off = equations.internal_w(_mean_soc(vehicle), give)
     must = (net > equations.discharge_max_w) | (speed - vehicle.engine.electric_max_mps >= 1e-5)
     steps = cycle.steps
-    n, length = grid.short_stages, -(-steps // grid.blocks)
+    n = grid.short_stages
     rows: list[list[float]] = []
     for t in range(step, step + n):
         if t >= steps:
@@ -71,8 +72,7 @@ def horizon(
             continue
         on = must[t] or t - step < held_s
         rows.append([1.0, net[t], speed[t], off[t], on, net[t], off[t], 1.0, 0.0, 0.0])
-    for block in range(grid.blocks):
-        seconds = range(max(block * length, step + n), min((block + 1) * length, steps))
+    for seconds in _blocks(range(step + n, steps), grid.blocks, n):
         classes: list[list[int]] = [[], [], []]
         for t in seconds:
             hard, braking = demand[t] > grid.class_hard_w, demand[t] < grid.class_braking_w
@@ -87,11 +87,20 @@ def horizon(
                 means += [float(np.mean(a[free])) for a in (net, off)]
             swing = [-np.inf, -np.inf]  # inside a block SOC is not limited
             rows.append([float(len(member)), *means, -grid.rise_share * len(entries), *swing])
-        if (block + 1) * length > step + n < steps and block * length < steps:
-            rows[-1][8:] = _kept_j(block * length, length, off, demand, vehicle, settings)
-        else:
-            rows[-1][8:] = [0.0, 0.0]
+        place_s = -(-steps // grid.blocks)
+        kept_j = [0.0, 0.0]
+        if seconds:
+            place = seconds[-1] // place_s
+            kept_j = _kept_j(place * place_s, place_s, off, demand, vehicle, settings)
+        rows[-1][8:] = kept_j
     return Horizon(*np.array(rows).T)
+
+
+def _blocks(left: range, count: int, least_s: int) -> list[range]:
+    """What is left of the trip in that many blocks, some of them empty near arrival."""
+    if len(left) >= count * least_s:
+        return [left[len(left) * k // count : len(left) * (k + 1) // count] for k in range(count)]
+    return [left[k * least_s : (k + 1) * least_s] for k in range(count)]
 
 
 def _target_soc(vehicle: Vehicle) -> float:
@@ -113,7 +122,7 @@ def _kept_j(
     vehicle: Vehicle,
     settings: MhQpSettings,
 ) -> list[float]:
-    """Energy kept from both SOC limits at the end of a block: of the swing in it and in the next.
+    """Energy kept from both SOC limits at the end of a place: of the swing in it and in the next.
 
     The engine rests outside hard driving, and makes up for all of it evenly in hard driving.
     """
