@@ -16,5 +16,5 @@ def forecast_scalars(vehicle: Vehicle, horizon: HorizonSettings) -> dict[str, fl
 
 
 def fixed_block_s(horizon: HorizonSettings) -> int:
-    """Return the length of a block, s; 0 if the length of the trip sets it."""
+    """Return the length of a block, s; 0 if blocks share out what is ahead."""
     return 0 if horizon.blocks else horizon.block_s

@@ -85,7 +85,7 @@ class Values:
     iterations, departure_iterations : K of a step and of each linearisation before the trip
     departure_linearisations, plan_valid_steps, warm_up_steps : as in the Python controller
     duration_exponent : of the column scaling
-    block_s : length of a block; 0 if the trip's length sets it
+    block_s : length of a block; 0 if blocks share out what is ahead
     learning : whether the fuel map is learned
     constants : common to the C code and Python, by module
     costate : sizes of the costate method; None with the QP

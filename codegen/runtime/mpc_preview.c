@@ -1,8 +1,9 @@
 /* Check of the preview: possible for this car, and going on from the one received before.
  *
  * Each second that passes takes at most a second, and what is driven in it, out of the statistics
- * of the trip, so that the same message again is not news; NEWS is the share of the trip that may
- * change beside that. A new route is therefore used from its second second on.
+ * of the trip and over the bounds of blocks that move on, out of one and into the other. The same
+ * message again is not news; NEWS is the share of the trip that may change beside that. A new route
+ * is therefore used from its second second on.
  */
 #include "mpc_constants.h"
 #include "mpc_model.h"
@@ -84,6 +85,14 @@ static int32_t is_same(const mpc_heard *before, const mpc_in *in)
     return same;
 }
 
+/* Seconds that may change in a second: two where a bound moves on, of blocks that share out the rest of
+ * the trip, else one that is over, with room for a place that catches up. */
+#if MPC_BLOCK_S > 0
+#define MOVED_S REAL(2.0)
+#else
+#define MOVED_S (REAL(2.0) * (mpc_real)MPC_BLOCKS)
+#endif
+
 static int32_t goes_on(const mpc_heard *before, const mpc_in *in)
 {
     mpc_real total_s = REAL(0.0);
@@ -106,7 +115,7 @@ static int32_t goes_on(const mpc_heard *before, const mpc_in *in)
         const mpc_real old_w = before->short_demand_w[(from < MPC_SHORT) ? from : 0];
         news_w += seen * REAL_ABS(in->short_demand_w[k] - old_w);
     }
-    const mpc_real free_s = (REAL(2.0) * (mpc_real)before->age) + (NEWS * total_s);
+    const mpc_real free_s = (MOVED_S * (mpc_real)before->age) + (NEWS * total_s);
     const mpc_real net_w = mpc_par.can_net_max_w - mpc_par.can_net_min_w;
     const mpc_real internal_w = mpc_par.can_internal_max_w - mpc_par.can_internal_min_w;
     int32_t fine = within(moved_s, REAL(0.0), free_s);

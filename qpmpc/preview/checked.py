@@ -141,7 +141,8 @@ class CheckedPreview:
         """Whether it is that of the second before, but for the time passed and some news.
 
         Each second that passes takes at most a second, and what is driven in it, out of the
-        statistics of the trip; NEWS is the share of the trip that may change beside that.
+        statistics of the trip and over the bounds of blocks that move on, out of one and into the
+        other; NEWS is the share of the trip that may change beside that.
         """
         before, can = self._received, self._can
         if before is None:
@@ -150,7 +151,7 @@ class CheckedPreview:
         old, new = before.long, preview.long
         if passed > 0 and _is_same(before, preview):
             return False  # an old message once more
-        free_s = 2.0 * passed + NEWS * float(old.duration_s.sum())
+        free_s = 2.0 * max(self.settings.blocks, 1) * passed + NEWS * float(old.duration_s.sum())
         kept = self.settings.short_stages - passed
         news_w = np.abs(preview.short_demand_w[: max(kept, 0)] - before.short_demand_w[passed:])
         return (
