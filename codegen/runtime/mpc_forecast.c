@@ -316,14 +316,17 @@ static void fill_short(const mpc_road *seen, mpc_in *in)
     }
 }
 
-/* What is kept at the end of a block: that of the place where it ends; nothing, if it is empty. */
+/* What is kept at the end of a block: that of the place where it ends; nothing, if it is empty. At
+ * arrival the memory is not looked at, which may be that of no forecast. */
 static mpc_swing kept_of(const mpc_forecast *forecast, int32_t block, int32_t is_arriving)
 {
-    const int32_t start = edge_of(forecast, forecast->next, block);
-    const int32_t end = edge_of(forecast, forecast->next, block + 1);
     mpc_swing kept = {REAL(0.0), REAL(0.0)};
-    if ((is_arriving == 0) && (start < end)) {
-        kept = forecast->swing[(end - 1) / forecast->place_s];
+    if (is_arriving == 0) {
+        const int32_t start = edge_of(forecast, forecast->next, block);
+        const int32_t end = edge_of(forecast, forecast->next, block + 1);
+        if (start < end) {
+            kept = forecast->swing[(end - 1) / forecast->place_s];
+        }
     }
     return kept;
 }

@@ -159,8 +159,8 @@ MUTATIONS = [
         "    return fields", "    fields[0] *= 0.9\n    return fields", STAGES,
     ),
     Mutation(
-        "long horizon is a second late", StageBuilder, "_long_start",
-        "np.clip(self.beyond(step), self", "np.clip(self.beyond(step + 1), self", STAGES,
+        "long horizon is a second late", StageBuilder, "_edges",
+        "else self.beyond(step)", "else self.beyond(step + 1)", STAGES,
     ),
     Mutation(
         "battery loss of the mean, not mean loss", qpmpc.preview.stages, "_fields",
