@@ -48,9 +48,11 @@ static int32_t edge_of(const mpc_forecast *forecast, int32_t first, int32_t bloc
     const int32_t at = block * MPC_BLOCK_S;
     const int32_t edge = (at > first) ? at : first;
 #else
-    const int32_t even = (block * (forecast->covered - first)) / MPC_BLOCKS;
-    const int32_t least = block * MPC_SHORT;
-    const int32_t edge = first + ((even > least) ? even : least);
+    const int32_t left = forecast->covered - first;
+    const int32_t even = (block * left) / MPC_BLOCKS;
+    const int32_t shortest = left - ((MPC_BLOCKS - block) * MPC_SHORT);
+    const int32_t after = (even < shortest) ? even : shortest;
+    const int32_t edge = first + ((after > 0) ? after : 0);
 #endif
     return (edge < forecast->covered) ? edge : forecast->covered;
 }

@@ -19,7 +19,7 @@ class HorizonSettings(BaseModel):
     ----------
     short_stages : N stages of 1 s with accurate preview
     blocks : number of equal blocks into which what is ahead beyond the short horizon is cut, every
-        second anew; none is shorter than the short horizon. Or
+        second anew; but for the first, none is shorter than the short horizon. Or
     block_s : length of a block, s, at its own place on the trip; used when `blocks` is 0. With both
         0 there is no long horizon: the short one recedes to arrival
     classes : 3 demand classes per block (hard, easy, braking) or 1 (the mean, as in the paper)
@@ -70,9 +70,10 @@ class HorizonSettings(BaseModel):
 
         With n blocks and r seconds left, block k begins
 
-            min(max(floor(k r / n), k N), r)   or, with a length b of their own,   k b
+            max(min(floor(k r / n), r - (n - k) N), 0)   or, with a length b of their own,   k b
 
-        from `first` or from departure, and no block begins before `first`. A boundary never goes
+        from `first` or from departure, and no block begins before `first`. Blocks that have become
+        as short as the short horizon thus stay where they are and pass one by one. A boundary never goes
         back and passes no more seconds than `first` does, so that a block hands its first seconds
         over to the one before it, and its slot goes on with nearly the same statistics.
 
@@ -89,7 +90,8 @@ class HorizonSettings(BaseModel):
         if not self.blocks:
             return np.clip(k * self.block_s, first, trip_steps)
         left = trip_steps - first
-        return first + np.minimum(np.maximum(k * left // self.blocks, k * self.short_stages), left)
+        shortest = left - (self.blocks - k) * self.short_stages
+        return first + np.maximum(np.minimum(k * left // self.blocks, shortest), 0)
 
     def block_count(self, trip_steps: int) -> int:
         """Number of blocks for a trip of that many 1 s steps; the last may be empty.

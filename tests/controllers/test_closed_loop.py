@@ -97,11 +97,9 @@ def test_hot_coolant_in_mild_weather_keeps_its_limit(car, excess_k):
 
 
 def test_the_relaxation_is_tight_and_nearly_integral(runs):
-    """Twice the iterations: what the 30 of a step leave of the gap is the solver's."""
-    nearer = simulate(load_cycle("nycc"), "mh-qp", settings={"mh_qp.admm.iterations": 60})
-    assert nearer.summary()["relaxation_gap"]["mean"] < 0.04
-    assert runs["nycc", "mh-qp"].summary()["relaxation_gap"]["mean"] < 0.1
-    assert runs["nycc", "mh-qp"].summary()["sigma_integral_share"] > 0.95
+    summary = runs["nycc", "mh-qp"].summary()
+    assert summary["relaxation_gap"]["mean"] < 0.04  # 30 iterations, not a converged solution
+    assert summary["sigma_integral_share"] > 0.95
 
 
 def test_charge_is_sustained(runs):

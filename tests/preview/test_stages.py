@@ -159,7 +159,7 @@ def test_blocks_share_out_what_is_ahead_and_none_is_short(first, left, blocks, s
     assert edges[0] == first
     assert edges[-1] == first + left
     long_s = np.diff(edges)
-    full = long_s[long_s > 0][:-1]  # all but the last, which holds what is left
+    full = long_s[long_s > 0][1:]  # all but the first, which passes
     assert np.all(full >= short)
     assert np.ptp(long_s) <= 1 or np.all(full <= max(short, -(-left // blocks)))
     later = layout.edges(min(first + passed, first + left), first + left)

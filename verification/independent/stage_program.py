@@ -5,6 +5,7 @@ this.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -97,10 +98,12 @@ def horizon(
 
 
 def _blocks(left: range, count: int, least_s: int) -> list[range]:
-    """What is left of the trip in that many blocks, some of them empty near arrival."""
+    """What is left of the trip in that many blocks, the first of them empty near arrival."""
     if len(left) >= count * least_s:
         return [left[len(left) * k // count : len(left) * (k + 1) // count] for k in range(count)]
-    return [left[k * least_s : (k + 1) * least_s] for k in range(count)]
+    whole, rest = divmod(len(left), least_s)
+    ends = [0] * (count - whole) + [rest + k * least_s for k in range(whole + 1)]
+    return [left[a:b] for a, b in pairwise(ends)]
 
 
 def _target_soc(vehicle: Vehicle) -> float:
