@@ -7,7 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from browser import assert_works
 from c_project import need, run
@@ -255,9 +254,10 @@ def test_the_documented_steps_for_a_cortex_m7_work_in_qemu(tmp_path, monkeypatch
     # the same objects, with the firmware's main
     elf = make_firmware(folder)
     monkeypatch.setattr("qpmpc.codegen.pil.loop.build_firmware", lambda *_: elf)
-    trip = Trip(Cycle.from_samples("nycc", WHOLE.time_s[:21], WHOLE.speed_mps[:21]))
-    counted = processor_in_the_loop(trip, controller="mh-costate").instructions
-    assert np.median(found.log.step) == pytest.approx(np.median(counted), rel=1e-4)
+    # and the same trip, second by second: another trip's data take some tens of instructions more
+    # (docs/timing.md), the two mains themselves fewer than twenty
+    counted = processor_in_the_loop(Trip(WHOLE), controller="mh-costate").instructions
+    assert found.log.step == pytest.approx(counted[: found.log.step.size], abs=20)
 
 
 @needs_qemu
