@@ -73,9 +73,9 @@ class HorizonSettings(BaseModel):
             max(min(floor(k r / n), r - (n - k) N), 0)   or, with a length b of their own,   k b
 
         from `first` or from departure, and no block begins before `first`. Blocks that have become
-        as short as the short horizon thus stay where they are and pass one by one. A boundary never goes
-        back and passes no more seconds than `first` does, so that a block hands its first seconds
-        over to the one before it, and its slot goes on with nearly the same statistics.
+        as short as the short horizon thus stay where they are and pass one by one. A boundary never
+        goes back and passes no more seconds than `first` does, so that a block hands its first
+        seconds over to the one before it, and its slot goes on with nearly the same statistics.
 
         Parameters
         ----------
