@@ -1,5 +1,6 @@
 """Hostile inputs for loaders of users' files: good ones with anything done to them."""
 
+import json
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -128,12 +129,13 @@ MANIFEST = Manifest(
 )
 WITH_BASE = "name = 'mine'\nbase = 'prius-nimh'\n[battery]\nsoc_min = 0.45\naux_power_w = 500\n"
 VEHICLE = load_vehicle()
+OWN_VALUES = {  # which are good
+    f"{section}.{key}": json.dumps(value)
+    for section, values in VEHICLE.model_dump(exclude={"name", "description"}).items()
+    for key, value in values.items()
+}
 KEYS = [
-    *(
-        f"{section}.{key}"
-        for section, values in VEHICLE.model_dump(exclude={"name", "description"}).items()
-        for key in values
-    ),
+    *OWN_VALUES,
     "mh_qp.admm.rho", "mh_qp.admm.iterations", "mh_qp.horizon.blocks", "mh_qp.qp.terminal_high",
     "mh_qp.solver", "mh_qp.osqp.rho", "rule_based.on_w", "ecms.factor_min", "dp.soc_step",
     "baseline_mpc.horizon_s", "mh_qp", "name", "others.x", "mh_qp_paper.pwa.alpha",
@@ -149,7 +151,9 @@ def settings_texts(draw: st.DrawFn) -> list[str]:
     texts = []
     for _ in range(draw(st.integers(1, 3))):
         key, value = draw(st.sampled_from(KEYS)), draw(st.sampled_from(GOOD_VALUES))
-        what = draw(st.sampled_from(["good", "good", "key", "value", "value", "text"]))
+        what = draw(st.sampled_from(["own", "own", "good", "key", "value", "value", "text"]))
+        if what == "own":
+            value = OWN_VALUES.get(key, value)
         if what == "key":
             key = draw(PIECES | PIECES.map(lambda piece, key=key: key + piece))
         elif what == "value":

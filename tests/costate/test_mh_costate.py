@@ -152,13 +152,20 @@ def test_settings_by_name(road):
 
 @pytest.mark.parametrize("vehicle", ["paper-nimh", "prius-liion"])
 def test_the_certificate_of_mh_qp(short_road, vehicle):
-    """Of 30 iterations, and of so many that the QP is solved: never negative, and smaller."""
+    """Of 30 iterations, and of so many that the QP is solved: never negative, and smaller.
+
+    Compared in seconds in which the states are the same and no start is due within sight, so that
+    rounding on and off costs nothing: later that is more than what 30 iterations leave.
+    """
     asked = {"mh_qp.certificate": True, "mh_qp.implementation": "python"}
     few = simulate(short_road, "mh-qp", vehicle, settings=asked)
     many = simulate(short_road, "mh-qp", vehicle, settings={**asked, "mh_qp.admm.iterations": 500})
     for run in (few, many):
         assert (run.trajectory.certificate_g > -1e-6).all()
-    assert np.median(many.trajectory.certificate_g) < np.median(few.trajectory.certificate_g)
+    same = slice(1, 10)
+    np.testing.assert_allclose(few.trajectory.soc[:10], many.trajectory.soc[:10], atol=1e-5)
+    mean_g = [run.trajectory.certificate_g[same].mean() for run in (few, many)]
+    assert mean_g[0] > 2.0 * mean_g[1]
     plain = simulate(short_road, "mh-qp", vehicle, settings={"mh_qp.implementation": "python"})
     assert np.array_equal(plain.trajectory.p_eng_w, few.trajectory.p_eng_w)
 

@@ -9,7 +9,8 @@ from qpmpc.codegen.controller import GeneratedController
 from qpmpc.codegen.costate_controller import GeneratedCostate
 
 GENERATED = {"2": GeneratedController, "3": GeneratedCostate}
-WITHIN_G = {"2": 1e-9, "3": 1e-5}  # see test_closed_loop.py
+# a tie of mh-costate's search moves the power by up to 1 W for a second, see test_closed_loop.py
+WITHIN_G = {"2": 1e-9, "3": 1e-4}
 WARM = {"t_cl_min_degc": 46.0, "t_min_degc": 47.0}
 DISCARD = 2
 FLAGS = -2  # their place in what a loop shows of a second
