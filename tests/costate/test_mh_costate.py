@@ -154,8 +154,8 @@ def test_settings_by_name(road):
 def test_the_certificate_of_mh_qp(short_road, vehicle):
     """Of 30 iterations, and of so many that the QP is solved: never negative, and smaller.
 
-    Compared in seconds in which the states are the same and no start is due within sight, so that
-    rounding on and off costs nothing: later that is more than what 30 iterations leave.
+    Compared in the first seconds, in which the states are the same and rounding on and off costs
+    little: later it costs more than what 30 iterations leave.
     """
     asked = {"mh_qp.certificate": True, "mh_qp.implementation": "python"}
     few = simulate(short_road, "mh-qp", vehicle, settings=asked)

@@ -9,9 +9,8 @@ from qpmpc.codegen.controller import GeneratedController
 from qpmpc.codegen.costate_controller import GeneratedCostate
 
 GENERATED = {"2": GeneratedController, "3": GeneratedCostate}
-# a tie of mh-costate's search moves the power by up to 1 W for a second, see test_closed_loop.py
-WITHIN_G = {"2": 1e-9, "3": 1e-4}
-WARM = {"t_cl_min_degc": 46.0, "t_min_degc": 47.0}
+WITHIN_G = {"2": 1e-9, "3": 1e-5}  # see test_closed_loop.py
+WARM = {"t_cl_min_degc": 48.0, "t_min_degc": 49.0}  # at 46 and 49 the search meets a tie
 DISCARD = 2
 FLAGS = -2  # their place in what a loop shows of a second
 CONTRADICTION = (
