@@ -10,7 +10,9 @@ from qpmpc.codegen.costate_controller import GeneratedCostate
 
 GENERATED = {"2": GeneratedController, "3": GeneratedCostate}
 WITHIN_G = {"2": 1e-9, "3": 1e-5}  # see test_closed_loop.py
-WARM = {"t_cl_min_degc": 48.0, "t_min_degc": 49.0}  # at 46 and 49 the search meets a tie
+# Not a higher coolant floor: there mh-costate's search meets ties that rounding decides, and
+# 1e-13 of SOC moves the fuel by up to 0.5 g; here by 3e-11 (docs/embedded.md)
+FULLER = {"terminal_soc_low": 0.62, "terminal_soc_high": 0.63}
 DISCARD = 2
 FLAGS = -2  # their place in what a loop shows of a second
 CONTRADICTION = (
@@ -58,12 +60,12 @@ def test_the_whole_page_is_listed(units, trip, fmi):
 
 def test_set_before_departure_it_is_calibrate_in_python(units, trip, fmi):
     controller, plant = units
-    Loop(controller, plant, tuned=WARM).drive(range(trip.steps))
+    Loop(controller, plant, tuned=FULLER).drive(range(trip.steps))
     calibrated = GENERATED[fmi](trip)
-    calibrated.calibrate(WARM)
+    calibrated.calibrate(FULLER)
     expected_g = simulate(trip, calibrated).fuel_g
     assert plant.get("fuel_total_g")[0] == pytest.approx(expected_g, abs=WITHIN_G[fmi])
-    assert expected_g > simulate(trip, CONTROLLERS[fmi]).fuel_g + 1.0  # which is no accident
+    assert expected_g > simulate(trip, CONTROLLERS[fmi]).fuel_g + 5.0  # 0.02 of the battery
     assert controller.logged == []
 
 
