@@ -46,7 +46,7 @@ CONSTANTS_OF_ALL = of_modules(
     (monitor, "LONG_AGO_S LONGEST_GAP_S"),
     (checked, "LONGEST_STAGE_S NEWS SAME_MEANS_W"),
     (swing, "NO_LIMIT_J LEAST_KEPT_J DRAIN_SHARE FILLED_SHARE"),
-    (coolant_floor, "USABLE"),
+    (coolant_floor, "USABLE ARRIVAL_K"),
     (qp_planner, "FAILURES_FORGIVEN"),
     (base, "LARGEST_PLAUSIBLE"),
     (demand, "GRAVITY_MPS2 ROAD_LOAD_DEGC"),

@@ -1,8 +1,8 @@
 /* Coolant temperature to be had in good time before an engine beside a full battery cannot heat.
  *
  * Forwards: the battery, discharged wherever it can be, is filled by long braking; a share of what
- * is left of it is all that the engine can charge. Backwards from arrival: the coolant that is lost
- * beyond the engine's largest heat. See qpmpc.qp.coolant_floor.
+ * is left of it is all that the engine can charge. Backwards from arrival, where heat is of no use
+ * any more: the coolant that is lost beyond the engine's largest heat. See qpmpc.qp.coolant_floor.
  */
 #include "mpc_constants.h"
 #include "mpc_heat.h"
@@ -40,7 +40,9 @@ void mpc_floor_find(mpc_state *state, mpc_real soc)
     }
     const mpc_real most =
         real_max(REAL(0.5) * (cal->t_cl_min_degc + cal->t_cl_max_degc), cal->t_min_degc);
-    mpc_real floor_degc = cal->t_min_degc;
+    /* an engine at rest may coast to the limit: heat left at arrival is of no use */
+    mpc_real coasting_degc = real_min(cal->t_cl_min_degc + ARRIVAL_K, cal->t_min_degc);
+    mpc_real floor_degc = coasting_degc;
     state->highest_floor_degc = floor_degc;
     for (int32_t k = MPC_STAGES - 1; k >= 0; k--) {
         mpc_stage_road *const road = &state->stage[k].road;
@@ -48,6 +50,7 @@ void mpc_floor_find(mpc_state *state, mpc_real soc)
         state->highest_floor_degc = real_max(state->highest_floor_degc, floor_degc);
         const mpc_real lost_k = (road->duration_s * heat_cooling_w(floor_degc, road->speed_mps))
                                 / mpc_par.heat_capacity_j_per_k;
-        floor_degc = real_clip((floor_degc + lost_k) - gain_k[k], cal->t_min_degc, most);
+        coasting_degc = real_min(coasting_degc + lost_k, cal->t_min_degc);
+        floor_degc = real_clip((floor_degc + lost_k) - gain_k[k], coasting_degc, most);
     }
 }

@@ -13,6 +13,7 @@ from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
 
+ARRIVAL_K = 0.025  # floor at arrival, above the limit: the safety layer keeps 0.02 K from it
 USABLE = 0.5  # of the room for charge: the engine's heat is not had all at once; docs/choice.md
 
 
@@ -32,13 +33,17 @@ class CoolantFloor:
     Its largest heat then is Q(P) at P = max(P0, P_aux) + min(W_k / h_k, P_chg), and backwards from
     the end
 
-        T_{k-1} = max(T_min, T_k - h_k (Q - Q_out(T_k)) / C).
+        T_{k-1} = max(M_{k-1}, T_k - h_k (Q - Q_out(T_k)) / C).
+
+    M is T_min, which has a margin to the limit itself. Heat that is left at arrival is of no use,
+    so there M and T are `ARRIVAL_K` above the limit, and before it M is what an engine at rest
+    loses until then, M_{k-1} = min(T_min, M_k + h_k Q_out(T_k) / C).
 
     Parameters
     ----------
     vehicle, line : parameters, and the optimal line of the engine
     battery_energy_j : energy of a unit of SOC
-    least_degc : floor where the trip ahead asks for nothing more
+    least_degc : T_min, floor where the trip ahead asks for nothing more and is not about to end
     """
 
     def __init__(
@@ -71,11 +76,12 @@ class CoolantFloor:
             gained_k.append(h * engine_w(thermal, fuel_w, power) / per_k)
             room = min(max(room + h * off / self._energy_j, 0.0), widest)
         floors = []
-        floor = self._least
+        floor = coasting = min(thermal.t_cl_min_degc + ARRIVAL_K, self._least)
         for h, speed, gain in zip(
             reversed(durations), reversed(speeds), reversed(gained_k), strict=True
         ):
             floors.append(floor)
             lost = h * cooling_w(thermal, floor, speed) / per_k
-            floor = min(max(self._least, floor + lost - gain), self._most)
+            coasting = min(coasting + lost, self._least)
+            floor = min(max(coasting, floor + lost - gain), self._most)
         return np.array(floors[::-1])

@@ -295,13 +295,16 @@ def _coolant_floor_degc(
         kept = (1.0 - th.exhaust_share) * (burnt * equations.lhv_j_per_g - shaft)
         gain[k] = h * kept / th.heat_capacity_j_per_k
         charge = min(max(charge - h * float(road.off_w[k]) / energy_j, cell.soc_min), cell.soc_max)
-    floor = np.full(n, coldest)
+    slack_k = 0.025  # at arrival, where heat is worth nothing; the safety layer asks for 0.02
+    floor = np.full(n, min(th.t_cl_min_degc + slack_k, coldest))
+    rest_k = floor[-1]  # an engine that rests from here on arrives with that
     most = max(coldest, (th.t_cl_min_degc + th.t_cl_max_degc) / 2.0)
     for k in range(n - 1, 0, -1):
         air = float(equations.ua_w_per_k(road.speed_mps[k])) * (floor[k] - th.t_amb_degc)
         rest = float(equations.cabin_w(floor[k]) + equations.radiator_w(floor[k]))
         lost = float(road.h[k]) * (air + rest) / th.heat_capacity_j_per_k
-        floor[k - 1] = min(max(coldest, floor[k] + lost - gain[k]), most)
+        rest_k = min(coldest, rest_k + lost)
+        floor[k - 1] = min(max(rest_k, floor[k] + lost - gain[k]), most)
     return floor
 
 
