@@ -7,6 +7,7 @@ from qpmpc.closed_loop import drive
 from qpmpc.codegen.c_compiler import compiler
 from qpmpc.codegen.controller import GeneratedController
 from qpmpc.controllers.mh_qp import MhQp
+from qpmpc.controllers.safety import T_CL_MARGIN_K
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles import Cycle
 from qpmpc.pwa import PwaModel
@@ -15,7 +16,7 @@ from qpmpc.qp.scaling import ScalingSettings
 from qpmpc.qp.settings import QpSettings
 from qpmpc.qp.stage_qp import qp_parameters
 from qpmpc.trip import Trip
-from qpmpc.vehicle import load_vehicle
+from qpmpc.vehicle import Command, Plant, PlantState, load_vehicle
 from qpmpc.verification.independent.equations import Equations
 from qpmpc.verification.independent.stage_program import _coolant_floor_degc, horizon
 
@@ -27,6 +28,7 @@ COLD = load_vehicle().with_settings(
     }
 )
 OF_QP = ControllerSettings().mh_qp
+FROM_ARRIVAL_S = 30.0  # in less an engine at rest loses the margin of 0.3 K
 
 
 def descent(level_s: int = 400, down_s: int = 900) -> Cycle:
@@ -38,11 +40,19 @@ def descent(level_s: int = 400, down_s: int = 900) -> Cycle:
     return Cycle("descent", np.arange(n + 1.0), speed, grade)
 
 
-def floor_at(car, step: int, soc: float) -> np.ndarray:
+def floor_ahead(car, step: int, soc: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """Floors, s from there to the arrival, and the floor of a trip that asks for nothing."""
     model = PwaModel.of(car)
     numbers = qp_parameters(car, model, QpSettings(), ScalingSettings())
-    floor = CoolantFloor(car, model.line, numbers["battery_energy_j"], numbers["t_min_degc"])
-    return floor.at(Trip(descent(), car).preview(OF_QP.horizon).source.at(step), soc)
+    least = numbers["t_min_degc"]
+    floor = CoolantFloor(car, model.line, numbers["battery_energy_j"], least)
+    stages = Trip(descent(), car).preview(OF_QP.horizon).source.at(step)
+    left_s = stages.duration_s.sum() - stages.duration_s.cumsum()
+    return floor.at(stages, soc), left_s, least
+
+
+def floor_at(car, step: int, soc: float) -> np.ndarray:
+    return floor_ahead(car, step, soc)[0]
 
 
 @pytest.mark.parametrize(
@@ -58,14 +68,34 @@ def test_the_floor_is_that_of_the_equations(step, soc) -> None:
 
 
 def test_the_floor_rises_towards_the_full_battery_and_is_low_again_at_the_end() -> None:
-    floor = floor_at(COLD, 300, 0.5)
-    assert floor[0] == floor[-1] == floor.min()
-    assert floor.max() > floor[-1] + 5.0
+    floor, left_s, least = floor_ahead(COLD, 300, 0.5)
+    assert floor[0] == floor[left_s > FROM_ARRIVAL_S].min() == least
+    assert floor[-1] == floor.min() < least
+    assert floor.max() > least + 5.0
 
 
-def test_with_the_shipped_settings_nothing_is_asked() -> None:
-    floor = floor_at(load_vehicle(), 0, 0.6)
-    np.testing.assert_array_equal(floor, floor[0])
+def test_with_the_shipped_settings_nothing_is_asked_before_arrival() -> None:
+    floor, left_s, least = floor_ahead(load_vehicle(), 0, 0.6)
+    np.testing.assert_array_equal(floor[left_s > FROM_ARRIVAL_S], least)
+
+
+def test_an_engine_at_rest_may_coast_to_the_limit_at_arrival() -> None:
+    """The plant's own coolant, engine off, ends just above what the safety layer keeps."""
+    car = load_vehicle()
+    trip, plant, ahead_s = Trip(descent(), car), Plant(car), 15
+    floor, _, least = floor_ahead(car, trip.steps - ahead_s, 0.6)
+    seconds = floor[:ahead_s]
+    limit = car.thermal.t_cl_min_degc
+    assert limit + T_CL_MARGIN_K < seconds[-1] < limit + 2.0 * T_CL_MARGIN_K
+    assert np.all(np.diff(seconds) <= 0.0)
+    below = np.flatnonzero(seconds < least)
+    assert len(below) > 5  # the margin of 0.3 K is the loss of some ten seconds
+    state = PlantState(0.6, float(seconds[below[0]]))
+    for k in below[1:]:
+        second = trip.steps - ahead_s + int(k)
+        demand_w, speed_mps = trip.truth.demand_w[second], trip.truth.speed_mps[second]
+        state, _ = plant.step(state, Command(False, 0.0), demand_w, speed_mps)
+        assert state.t_cl_degc == pytest.approx(seconds[k], abs=1e-3)
 
 
 @pytest.mark.slow
