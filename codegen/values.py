@@ -18,7 +18,7 @@ from qpmpc.preview import checked, swing
 from qpmpc.pwa import learned_fuel
 from qpmpc.pwa.model import PwaModel
 from qpmpc.pwa.model import learned_fuel as learner_of
-from qpmpc.qp import coolant_floor, last_run, linearisation, polish, rows, stage_qp
+from qpmpc.qp import coolant_floor, heating_run, last_run, linearisation, polish, rows, stage_qp
 from qpmpc.qp.quantities import pieces_of
 from qpmpc.qp.rows import Rows, Table, table_of
 from qpmpc.qp.stage_qp import qp_parameters
@@ -55,6 +55,7 @@ CONSTANTS = CONSTANTS_OF_ALL | of_modules(
     (qp_planner, "FAILURES_FORGIVEN LEAST_SIZE_W"),
     (stage_qp, "LEAST_COST"),
     (polish, "LEAST_RATIO"),
+    (heating_run, "IDLING_W"),
     (last_run, "LEAST_GAIN_W WANTED_LEAST FUEL_LEAST MUST_LEAST_S"),
     (realise, "STAY_S STAY_SHARE"),
     (rows, "SHORTEST_SCALE_S SIGMA_FORCED COOL_SHARE MOOT_G_PER_S"),

@@ -63,6 +63,9 @@ mpc_real mpc_polish_power_w(const mpc_state *state, const mpc_prices *prices, mp
 /* mpc_last_run.c: power at which a run goes on for all that the plan still wants; 0 if it need not */
 mpc_real mpc_last_run_w(const mpc_state *state);
 
+/* mpc_heating_run.c: power at which it goes on for the heat that the coolant lacks; 0 likewise */
+mpc_real mpc_heating_run_w(const mpc_state *state);
+
 /* mpc_ramp.c: what the ramp asks of the coming second */
 mpc_real mpc_ramp_least_w(const mpc_state *state);
 

@@ -197,6 +197,7 @@ static void keep_plan(mpc_state *state)
     state->old_least_w = mpc_ramp_least_w(state);
 #if MPC_STARTS && !MPC_COSTATE
     state->old_least_w = real_max(state->old_least_w, mpc_last_run_w(state));
+    state->old_least_w = real_max(state->old_least_w, mpc_heating_run_w(state));
 #endif
     state->old_age = 0;
 }

@@ -17,6 +17,7 @@ from qpmpc.preview.stages import Stages
 from qpmpc.pwa.learned_fuel import LearnedFuel
 from qpmpc.pwa.model import PwaModel, learned_fuel
 from qpmpc.qp.expectation import expectation
+from qpmpc.qp.heating_run import heating_run_w
 from qpmpc.qp.last_run import last_run_w
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.polish import Polish
@@ -186,9 +187,12 @@ class QpPlanner(Planner):
                 net_w = float(stages.net_w[0])
                 power_w[0] = self._polish.power_w(prices, net_w, float(power_w[0]))
             if seen.engine_on:
-                engine, internal_w = self.trip.vehicle.engine, solved.x[:, Var.INTERNAL]
-                going_w = last_run_w(engine, self._polish, prices, stages, internal_w)
-                least_w = max(least_w, going_w)
+                vehicle, polish, x = self.trip.vehicle, self._polish, solved.x
+                going_w = last_run_w(vehicle.engine, polish, prices, stages, x[:, Var.INTERNAL])
+                heating_w = heating_run_w(
+                    vehicle, polish, prices, stages, x[:, Var.ON], seen.t_cl_degc
+                )
+                least_w = max(least_w, going_w, heating_w)
         return Plan(
             on_share,
             power_w,

@@ -1,0 +1,37 @@
+/* A run of the engine that goes on, where the coolant would not last to arrival without one more:
+ * a plan of shares rounds away what it lacks, the road makes a whole run of it.
+ *
+ * The same in Python, with the rule: qpmpc/qp/heating_run.py.
+ */
+#include "mpc_constants.h"
+#include "mpc_heat.h"
+#include "mpc_model.h"
+#include "mpc_parts.h"
+#include "mpc_real.h"
+
+mpc_real mpc_heating_run_w(const mpc_state *state)
+{
+    const mpc_calibration *const cal = &state->cal;
+    const mpc_real t_cl_degc = state->watch.good.t_cl_degc;
+    const mpc_prices prices = mpc_polish_prices(state);
+    const mpc_real power_w = mpc_polish_power_w(state, &prices, REAL(0.0));
+    const mpc_real fuel_w = (mpc_map_cold_factor(t_cl_degc) * mpc_par.lhv_j_per_g)
+                            * mpc_qp_least_fuel(state, power_w, REAL(1.0));
+    const mpc_real run_s = (mpc_real)mpc_par.min_on_s;
+    const mpc_real run_j = run_s * heat_engine_w(fuel_w, power_w);
+    mpc_real lack_j =
+        mpc_par.heat_capacity_j_per_k * ((cal->t_cl_min_degc + ARRIVAL_K) - t_cl_degc);
+    mpc_real must_s = REAL(0.0);
+    mpc_real wanted_s = REAL(0.0);
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
+        const mpc_stage_road *const road = &state->stage[k].road;
+        lack_j += road->duration_s * heat_cooling_w(cal->t_cl_min_degc, road->speed_mps);
+        must_s += road->duration_s * road->must_share;
+        wanted_s += road->duration_s * real_max(state->stage[k].x[MPC_VAR_ON], REAL(0.0));
+    }
+    const int32_t is_lacking = ((lack_j > REAL(0.0)) && (lack_j <= run_j)) ? 1 : 0;
+    const int32_t is_wanted = ((wanted_s <= run_s) && (must_s <= MUST_LEAST_S)) ? is_lacking : 0;
+    const int32_t is_asked =
+        ((state->watch.good.engine_on != 0) && (mpc_par.polish != 0)) ? is_wanted : 0;
+    return (is_asked != 0) ? real_max(power_w, IDLING_W) : REAL(0.0);
+}

@@ -1,0 +1,63 @@
+"""A run of the engine that goes on, where the coolant would not last to arrival without one more.
+
+A plan of shares rounds away a tenth of a kelvin that the coolant lacks at arrival; a minute later
+the safety layer starts the engine for it, for a shortest run.
+
+The same in C: codegen/runtime/mpc_heating_run.c.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpmpc.preview.stages import Stages
+from qpmpc.qp.coolant_floor import ARRIVAL_K
+from qpmpc.qp.last_run import MUST_LEAST_S
+from qpmpc.qp.polish import Polish, Prices
+from qpmpc.qp.rows import table_of
+from qpmpc.vehicle.engine import alpha_at
+from qpmpc.vehicle.heat import cooling_w, engine_w
+from qpmpc.vehicle.parameters import Vehicle
+
+IDLING_W = 1.0  # power that stands for idling: 0 would be no wish to run
+
+
+def heating_run_w(
+    vehicle: Vehicle,
+    polish: Polish,
+    prices: Prices,
+    stages: Stages,
+    on_share: NDArray[np.float64],
+    t_cl_degc: float,
+) -> float:
+    """Return the power at which a run goes on for the heat that is missing; 0 if it need not.
+
+    What the coolant lacks to last to arrival with the engine at rest is
+
+        J = C (T_cl,min + ARRIVAL_K - T) + sum_k h_k Q_out(T_cl,min, v_k)
+
+    With Q the heat of the engine at the least-cost power of the coming second (`Polish`) and b the
+    shortest run, the run goes on if one more could give that, 0 < J <= b Q, while the plan wants no
+    whole one, sum_k h_k sigma_k <= b, and no second ahead has to run anyway. Only where a start
+    costs something. To be asked while the engine runs.
+
+    Parameters
+    ----------
+    vehicle : gives b, C, Q_out
+    polish, prices : of the plan
+    stages : of the plan, from now on
+    on_share : sigma of each stage by the plan, shape (n,)
+    t_cl_degc : coolant now
+    """
+    engine, thermal = vehicle.engine, vehicle.thermal
+    must_s = float((stages.duration_s * stages.must_share).sum())
+    wanted_s = float((stages.duration_s * np.maximum(on_share, 0.0)).sum())
+    if not table_of(engine).has_start or must_s > MUST_LEAST_S or wanted_s > engine.min_on_s:
+        return 0.0
+    limit = thermal.t_cl_min_degc
+    lack_j = thermal.heat_capacity_j_per_k * (limit + ARRIVAL_K - t_cl_degc)
+    for h, speed_mps in zip(stages.duration_s.tolist(), stages.speed_mps.tolist(), strict=True):
+        lack_j += h * cooling_w(thermal, limit, speed_mps)
+    power_w = polish.power_w(prices, float(stages.net_w[0]), 0.0)
+    fuel_w = alpha_at(vehicle.cold_engine, t_cl_degc) * engine.lhv_j_per_g
+    heat_w = engine_w(thermal, fuel_w * float(polish.fuel(power_w)), power_w)
+    return max(power_w, IDLING_W) if 0.0 < lack_j <= engine.min_on_s * heat_w else 0.0
