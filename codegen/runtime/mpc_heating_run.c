@@ -19,8 +19,8 @@ mpc_real mpc_heating_run_w(const mpc_state *state)
                             * mpc_qp_least_fuel(state, power_w, REAL(1.0));
     const mpc_real run_s = (mpc_real)mpc_par.min_on_s;
     const mpc_real run_j = run_s * heat_engine_w(fuel_w, power_w);
-    mpc_real lack_j =
-        mpc_par.heat_capacity_j_per_k * ((cal->t_cl_min_degc + ARRIVAL_K) - t_cl_degc);
+    mpc_real lack_j = mpc_par.heat_capacity_j_per_k
+                      * ((cal->t_cl_min_degc + ARRIVAL_K) - t_cl_degc);
     mpc_real must_s = REAL(0.0);
     mpc_real wanted_s = REAL(0.0);
     for (int32_t k = 0; k < MPC_STAGES; k++) {
