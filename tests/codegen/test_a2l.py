@@ -133,7 +133,7 @@ def found(elf) -> CalibratedRun:
     whole = load_cycle("nycc")
     cut = Cycle.from_samples("start", whole.time_s[: SECONDS + 1], whole.speed_mps[: SECONDS + 1])
     changes = ["soc_min=0.9@60", "soc_min=0.4@70", "start_fuel_g=nan@70", "start_fuel_g=0.2@75"]
-    changes += ["t_min_degc=52@80"]
+    changes += ["search_switch_g_per_s=0.02@80"]
     method = Method.of("mh-costate", ControllerSettings())
     parsed = [Change.parsed(text) for text in changes]
     return drive_calibrated(Trip(cut), parsed, method, VALUES, "f32", elf)
@@ -141,7 +141,7 @@ def found(elf) -> CalibratedRun:
 
 def test_a_number_written_while_a_cycle_runs_changes_the_trip(found) -> None:
     *_, last = found.changes
-    assert (last.refused, last.before) == (False, pytest.approx(40.1))
+    assert (last.refused, last.before) == (False, pytest.approx(0.01))
     assert 80 <= last.differs_from <= 100
     before, after = (run.trajectory.p_eng_w for run in (found.plain, found.run))
     assert (before[: last.differs_from] == after[: last.differs_from]).all()  # the refused too
