@@ -63,7 +63,12 @@ OF_STATE = [
     Measured("watch.command_w", "W", "last command: engine power", *POWER),
     _yes_no("watch.command_on", "last command: engine on"),
     Measured("highest_floor_degc", "degC", "highest coolant that the plan asks for", *DEGC),
-    Measured("old_least_w", "W", "least power that ramp or a last run asks for", *POWER),
+    Measured(
+        "old_least_w",
+        "W",
+        "least power that ramp, battery or a run that goes on asks for",
+        *POWER,
+    ),
     Measured("old_age", "s", "age of the plan in use", *COUNT),
     Measured("road_age", "s", "age of the preview in use", *COUNT),
     Measured("failures", "1", "failures of the solver in a row", *COUNT),

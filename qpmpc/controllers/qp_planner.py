@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from qpmpc.controllers.empty_battery import empty_battery_w
 from qpmpc.controllers.monitor import Flag
 from qpmpc.controllers.qp_certificate import certificate_of
 from qpmpc.controllers.ramp import RampFloor
@@ -181,13 +182,15 @@ class QpPlanner(Planner):
         on_share = solved.x[short, Var.ON]
         power_w = power_while_on_w(on_share, solved.x[short, Var.P_ENG])
         least_w = self._ramp.least_w(solved.stages.seconds_w(short.stop), seen.soc)
-        if self.of_qp.polish and (seen.engine_on or on_share[0] >= STAY_SHARE):
+        if self.of_qp.polish:
             prices, stages = self.qp.prices(solved.duals), solved.stages
+            vehicle, polish, x = self.trip.vehicle, self._polish, solved.x
+            net_w = float(stages.net_w[0])
             if on_share[0] >= STAY_SHARE:
-                net_w = float(stages.net_w[0])
-                power_w[0] = self._polish.power_w(prices, net_w, float(power_w[0]))
+                power_w[0] = polish.power_w(prices, net_w, float(power_w[0]))
+            empty_w = empty_battery_w(vehicle.battery, polish, prices, net_w, seen.soc)
+            least_w = max(least_w, empty_w)
             if seen.engine_on:
-                vehicle, polish, x = self.trip.vehicle, self._polish, solved.x
                 going_w = last_run_w(vehicle.engine, polish, prices, stages, x[:, Var.INTERNAL])
                 heating_w = heating_run_w(
                     vehicle, polish, prices, stages, x[:, Var.ON], seen.t_cl_degc

@@ -55,11 +55,12 @@ class Polish:
     Attributes
     ----------
     fuel : f, as it is known now
+    maps : of the battery
     """
 
     def __init__(self, vehicle: Vehicle, model: PwaModel) -> None:
         maps, soc = BatteryMaps(vehicle.battery), vehicle.trip.soc_mean
-        self._vehicle, self._maps = vehicle, maps
+        self._vehicle, self.maps = vehicle, maps
         self.learn(model.fuel)
         square = maps.open_circuit.at(soc) ** 2
         self._discharge_w = square / (4.0 * maps.discharge.at(soc))
@@ -72,7 +73,7 @@ class Polish:
     def internal_w(self, power_w: float) -> float:
         """Return the battery's internal power l(P)."""
         soc = self._vehicle.trip.soc_mean
-        return float(self._maps.internal_power_w(soc, np.array([power_w]))[0])
+        return float(self.maps.internal_power_w(soc, np.array([power_w]))[0])
 
     def power_w(self, prices: Prices, net_w: float, planned_w: float) -> float:
         """Return that power, or `planned_w` where a charge in the battery has no price."""

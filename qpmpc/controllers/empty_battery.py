@@ -1,0 +1,47 @@
+"""A second that the battery cannot drive without falling below its lower SOC limit.
+
+The plan relaxes on and off to a share. What it gives by a share below one half is rounded away from
+second to second, until the limit stands in the next one. The safety layer would then give what that
+second lacks, however little, and again in the next: the engine's worst power, a second at a time.
+
+The same in C: codegen/runtime/mpc_empty_battery.c.
+"""
+
+from qpmpc.controllers.safety import SOC_MARGIN
+from qpmpc.qp.polish import Polish, Prices
+from qpmpc.vehicle.battery import BatteryMaps
+from qpmpc.vehicle.parameters import Battery
+from qpmpc.vehicle.section import STEP_S
+
+
+def empties(battery: Battery, maps: BatteryMaps, net_w: float, soc: float) -> bool:
+    """Return whether a second driven by the battery alone ends below its lower SOC limit.
+
+    P0 > P_reach(soc, soc_min + margin, 1 s), as the safety layer has it.
+
+    Parameters
+    ----------
+    battery, maps : limit and curves
+    net_w : P0 of the coming second, W
+    soc : state of charge now
+    """
+    return net_w > maps.power_to_reach_w(soc, battery.soc_min + SOC_MARGIN, STEP_S)
+
+
+def empty_battery_w(
+    battery: Battery, polish: Polish, prices: Prices, net_w: float, soc: float
+) -> float:
+    """Return the power of least cost in a second that empties the battery, W; 0 in any other.
+
+    The engine has to run then. It does at the least-cost power of the plan's prices (`Polish`), and
+    what that gives beyond the second's need spares the next ones a start.
+
+    Parameters
+    ----------
+    battery : its lower limit
+    polish, prices : of the plan
+    net_w, soc : as of `empties`
+    """
+    if not empties(battery, polish.maps, net_w, soc):
+        return 0.0
+    return polish.power_w(prices, net_w, 0.0)

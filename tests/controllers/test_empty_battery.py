@@ -1,0 +1,61 @@
+"""A second that would empty the battery runs the engine at the power of least cost."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import qpmpc
+from qpmpc.codegen.c_compiler import compiler
+from qpmpc.controllers.empty_battery import empties, empty_battery_w
+from qpmpc.controllers.safety import SOC_MARGIN
+from qpmpc.pwa import PwaModel
+from qpmpc.qp.polish import Polish, Prices
+from qpmpc.trajectory import Trajectory
+from qpmpc.vehicle import Command, Plant, PlantState, load_vehicle
+
+CAR = load_vehicle("paper-liion")
+PLANT, LIMIT = Plant(CAR), CAR.battery.soc_min
+POLISH = Polish(CAR, PwaModel.of(CAR))
+PRICES = Prices(fuel=1.0, p_eng=0.0, internal=9e-5)  # g/g, g/J: see test_last_run.py
+LOW = {"thermal.t_amb_degc": -1.9697, "trip.soc_init": 0.4585, "trip.t_cl_init_degc": 43.6669}
+POOR_W = 4e3  # half the power of least consumption and less: a third more fuel per kWh
+
+
+@given(above=st.floats(0.0, 0.01), demand_w=st.floats(-20e3, 20e3))
+def test_it_empties_where_the_plant_ends_below_the_limit(above: float, demand_w: float) -> None:
+    soc = LIMIT + SOC_MARGIN + above
+    net_w = demand_w + CAR.battery.aux_power_w
+    after, _ = PLANT.step(PlantState(soc, 60.0), Command(False, 0.0), demand_w, 10.0)
+    if abs(after.soc - LIMIT - SOC_MARGIN) < 1e-9:
+        return  # rounding decides
+    found = empties(CAR.battery, POLISH.maps, net_w, soc)
+    assert found is bool(after.soc < LIMIT + SOC_MARGIN)
+    power_w = empty_battery_w(CAR.battery, POLISH, PRICES, net_w, soc)
+    assert power_w == (POLISH.power_w(PRICES, net_w, 0.0) if found else 0.0)
+
+
+def drive(made_in: str) -> Trajectory:
+    settings = {**LOW, "mh_qp.implementation": made_in}
+    trip = "random-8111-160s"
+    return qpmpc.simulate(trip, "mh-qp", vehicle="paper-liion", settings=settings).trajectory
+
+
+def test_no_second_at_the_limit_is_driven_at_a_poor_power(monkeypatch) -> None:
+    """Four seconds of 0.3 to 3 kW before; now one of 12 kW, the power of least consumption."""
+    now = drive("python")
+    monkeypatch.setattr("qpmpc.controllers.qp_planner.empty_battery_w", lambda *_: 0.0)
+    before = drive("python")
+    poor = [int((run.engine_on & (run.p_eng_w < POOR_W)).sum()) for run in (now, before)]
+    assert poor[0] == 0 < poor[1]
+    assert now.soc.min() >= LIMIT
+    soc_g = 162.0  # of a unit of SOC with this battery: see test_last_run.py
+    fuel_g = [run.fuel_g.sum() - soc_g * (run.soc[-1] - run.soc[0]) for run in (now, before)]
+    assert fuel_g[1] > 1.03 * fuel_g[0]
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+def test_c_runs_as_python_does() -> None:
+    runs = [drive(made_in) for made_in in ("python", "c")]
+    np.testing.assert_array_equal(runs[0].engine_on, runs[1].engine_on)
+    np.testing.assert_allclose(runs[0].p_eng_w, runs[1].p_eng_w, rtol=1e-6, atol=1e-3)
