@@ -1,5 +1,5 @@
-/* A second that the battery cannot drive without falling below its lower limit gets the power that
- * costs least at the plan's prices, not the little that it lacks.
+/* A second that the battery cannot drive without falling below its lower limit, or in which the ramp
+ * asks for power, gets what costs least at the plan's prices, not the little that is lacking.
  *
  * The same in Python, with the reason: qpmpc/controllers/empty_battery.py.
  */
@@ -8,11 +8,13 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-mpc_real mpc_empty_battery_w(const mpc_state *state)
+mpc_real mpc_empty_battery_w(const mpc_state *state, mpc_real ramp_w)
 {
     const mpc_prices prices = mpc_polish_prices(state);
     const mpc_real power_w = mpc_polish_power_w(state, &prices, REAL(0.0));
     const mpc_real reach_w =
         mpc_map_power_to_reach_w(state->watch.good.soc, state->cal.soc_min + SOC_MARGIN);
-    return (state->stage[0].road.net_w > reach_w) ? power_w : REAL(0.0);
+    const int32_t is_needed = ((state->stage[0].road.net_w > reach_w) || (ramp_w > REAL(0.0))) ? 1
+                                                                                               : 0;
+    return (is_needed != 0) ? real_max(power_w, ramp_w) : REAL(0.0);
 }

@@ -60,8 +60,9 @@ mpc_real mpc_qp_relaxation_gap(const mpc_state *state);
 mpc_prices mpc_polish_prices(const mpc_state *state);
 mpc_real mpc_polish_power_w(const mpc_state *state, const mpc_prices *prices, mpc_real planned_w);
 
-/* mpc_empty_battery.c: power of a second that would empty the battery; 0 of any other */
-mpc_real mpc_empty_battery_w(const mpc_state *state);
+/* mpc_empty_battery.c: power of a second in which the battery or the ramp needs the engine, that of the
+ * ramp at least; 0 of any other */
+mpc_real mpc_empty_battery_w(const mpc_state *state, mpc_real ramp_w);
 
 /* mpc_last_run.c: power at which a run goes on for all that the plan still wants; 0 if it need not */
 mpc_real mpc_last_run_w(const mpc_state *state);

@@ -3,6 +3,7 @@
 The plan relaxes on and off to a share. What it gives by a share below one half is rounded away from
 second to second, until the limit stands in the next one. The safety layer would then give what that
 second lacks, however little, and again in the next: the engine's worst power, a second at a time.
+So it is with what the ramp asks for in good time.
 
 The same in C: codegen/runtime/mpc_empty_battery.c.
 """
@@ -29,19 +30,21 @@ def empties(battery: Battery, maps: BatteryMaps, net_w: float, soc: float) -> bo
 
 
 def empty_battery_w(
-    battery: Battery, polish: Polish, prices: Prices, net_w: float, soc: float
+    battery: Battery, polish: Polish, prices: Prices, net_w: float, soc: float, ramp_w: float
 ) -> float:
-    """Return the power of least cost in a second that empties the battery, W; 0 in any other.
+    """Return the power at which the engine runs because the battery needs it, W; 0 if it does not.
 
-    The engine has to run then. It does at the least-cost power of the plan's prices (`Polish`), and
-    what that gives beyond the second's need spares the next ones a start.
+    It does where the coming second would empty the battery or the ramp asks for power. That is the
+    least-cost power of the plan's prices then (`Polish`), what the ramp asks for at least: what it
+    gives beyond the second's need spares the next ones a start.
 
     Parameters
     ----------
     battery : its lower limit
     polish, prices : of the plan
     net_w, soc : as of `empties`
+    ramp_w : least power for the ramp, see `qpmpc.controllers.ramp`
     """
-    if not empties(battery, polish.maps, net_w, soc):
+    if ramp_w <= 0.0 and not empties(battery, polish.maps, net_w, soc):
         return 0.0
-    return polish.power_w(prices, net_w, 0.0)
+    return max(polish.power_w(prices, net_w, 0.0), ramp_w)

@@ -188,8 +188,8 @@ class QpPlanner(Planner):
             net_w = float(stages.net_w[0])
             if on_share[0] >= STAY_SHARE:
                 power_w[0] = polish.power_w(prices, net_w, float(power_w[0]))
-            empty_w = empty_battery_w(vehicle.battery, polish, prices, net_w, seen.soc)
-            least_w = max(least_w, empty_w)
+            battery, soc = vehicle.battery, seen.soc
+            least_w = max(least_w, empty_battery_w(battery, polish, prices, net_w, soc, least_w))
             if seen.engine_on:
                 going_w = last_run_w(vehicle.engine, polish, prices, stages, x[:, Var.INTERNAL])
                 heating_w = heating_run_w(

@@ -31,8 +31,11 @@ def test_it_empties_where_the_plant_ends_below_the_limit(above: float, demand_w:
         return  # rounding decides
     found = empties(CAR.battery, POLISH.maps, net_w, soc)
     assert found is bool(after.soc < LIMIT + SOC_MARGIN)
-    power_w = empty_battery_w(CAR.battery, POLISH, PRICES, net_w, soc)
-    assert power_w == (POLISH.power_w(PRICES, net_w, 0.0) if found else 0.0)
+    least_w = POLISH.power_w(PRICES, net_w, 0.0)
+    asked = [
+        empty_battery_w(CAR.battery, POLISH, PRICES, net_w, soc, ramp_w) for ramp_w in (0.0, 9e3)
+    ]
+    assert asked == [least_w if found else 0.0, max(least_w, 9e3)]
 
 
 def drive(made_in: str) -> Trajectory:
