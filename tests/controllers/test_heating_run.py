@@ -73,7 +73,7 @@ def test_a_run_before_the_arrival_is_spared(monkeypatch) -> None:
     monkeypatch.setattr("qpmpc.controllers.qp_planner.heating_run_w", lambda *_: 0.0)
     before = drive("python")
     assert int(now.started.sum()) < int(before.started.sum())
-    price_g = 316.0  # of a unit of SOC on this trip, dynamic programming's
+    price_g = 117.0  # of a unit of SOC on this trip, dynamic programming's
     fuel_g = [run.fuel_g.sum() - price_g * run.soc[-1] for run in (now, before)]
     assert fuel_g[1] - fuel_g[0] > CAR.engine.start_fuel_g
     assert now.t_cl_degc.min() >= CAR.thermal.t_cl_min_degc
