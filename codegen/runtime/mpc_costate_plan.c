@@ -94,6 +94,8 @@ void mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p_eng
     }
 }
 
+mpc_real mpc_method_least_w(const mpc_state *state) { return mpc_ramp_least_w(state); }
+
 void mpc_method_report(const mpc_state *state, mpc_out *out)
 {
     out->certificate_g = state->search.certificate_g;

@@ -8,10 +8,8 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-mpc_real mpc_empty_battery_w(const mpc_state *state, mpc_real ramp_w)
+mpc_real mpc_empty_battery_w(const mpc_state *state, mpc_real power_w, mpc_real ramp_w)
 {
-    const mpc_prices prices = mpc_polish_prices(state);
-    const mpc_real power_w = mpc_polish_power_w(state, &prices, REAL(0.0));
     const mpc_real reach_w =
         mpc_map_power_to_reach_w(state->watch.good.soc, state->cal.soc_min + SOC_MARGIN);
     const int32_t is_needed = ((state->stage[0].road.net_w > reach_w) || (ramp_w > REAL(0.0))) ? 1

@@ -9,12 +9,10 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-mpc_real mpc_heating_run_w(const mpc_state *state)
+mpc_real mpc_heating_run_w(const mpc_state *state, mpc_real power_w)
 {
     const mpc_calibration *const cal = &state->cal;
     const mpc_real t_cl_degc = state->watch.good.t_cl_degc;
-    const mpc_prices prices = mpc_polish_prices(state);
-    const mpc_real power_w = mpc_polish_power_w(state, &prices, REAL(0.0));
     const mpc_real fuel_w = (mpc_map_cold_factor(t_cl_degc) * mpc_par.lhv_j_per_g)
                             * mpc_qp_least_fuel(state, power_w, REAL(1.0));
     const mpc_real run_s = (mpc_real)mpc_par.min_on_s;

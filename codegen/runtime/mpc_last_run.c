@@ -8,15 +8,13 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-mpc_real mpc_last_run_w(const mpc_state *state)
+mpc_real mpc_last_run_w(const mpc_state *state, const mpc_prices *prices, mpc_real power_w)
 {
     const mpc_stage_road *const now = &state->stage[0].road;
-    const mpc_prices prices = mpc_polish_prices(state);
-    const mpc_real power_w = mpc_polish_power_w(state, &prices, REAL(0.0));
     const mpc_real gain_w = now->internal_off_w - mpc_map_planned_internal_w(now->net_w - power_w);
-    const mpc_real spent = (prices.fuel * mpc_qp_least_fuel(state, power_w, REAL(1.0)))
-                           + (prices.p_eng * power_w);
-    const mpc_real dearer = spent - (prices.internal * gain_w);
+    const mpc_real spent = (prices->fuel * mpc_qp_least_fuel(state, power_w, REAL(1.0)))
+                           + (prices->p_eng * power_w);
+    const mpc_real dearer = spent - (prices->internal * gain_w);
     mpc_real wanted_j = REAL(0.0);
     mpc_real must_s = REAL(0.0);
     for (int32_t k = 0; k < MPC_STAGES; k++) {
@@ -33,7 +31,7 @@ mpc_real mpc_last_run_w(const mpc_state *state)
         ((gain_w >= LEAST_GAIN_W) && ((dearer * wanted_s) <= state->cal.start_fuel_g)) ? is_one_run
                                                                                        : 0;
     const int32_t is_asked = ((state->watch.good.engine_on != 0) && (mpc_par.polish != 0)
-                              && (must_s <= MUST_LEAST_S) && (prices.fuel >= FUEL_LEAST))
+                              && (must_s <= MUST_LEAST_S) && (prices->fuel >= FUEL_LEAST))
                                  ? 1
                                  : 0;
     return ((pays != 0) && (is_asked != 0)) ? power_w : REAL(0.0);

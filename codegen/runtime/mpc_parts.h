@@ -40,13 +40,15 @@ void mpc_stages_expand_about_plan(mpc_state *state);
  * memory is sound. mpc_method_start: makes the values of a second and starts at the iterate.
  * mpc_method_iterate: iterates; returns 0 if the method itself reports a failure.
  * mpc_method_finish: puts the plan into the iterate; returns whether it is usable.
- * mpc_method_plan: on-share and mean power of the seconds ahead. */
+ * mpc_method_plan: on-share and mean power of the seconds ahead.
+ * mpc_method_least_w: power that the coming second gets at least, whatever its on-share. */
 void mpc_method_claim(const mpc_state *state);
 int32_t mpc_method_check(const mpc_state *state);
 void mpc_method_start(mpc_state *state);
 int32_t mpc_method_iterate(mpc_state *state, int32_t count);
 int32_t mpc_method_finish(mpc_state *state, int32_t solved);
 void mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p_eng_w);
+mpc_real mpc_method_least_w(const mpc_state *state);
 void mpc_method_report(const mpc_state *state, mpc_out *out);
 
 /* mpc_qp.c: values of the quadratic program. mpc_qp_least_fuel: least fuel rate of the hot engine that
@@ -60,15 +62,13 @@ mpc_real mpc_qp_relaxation_gap(const mpc_state *state);
 mpc_prices mpc_polish_prices(const mpc_state *state);
 mpc_real mpc_polish_power_w(const mpc_state *state, const mpc_prices *prices, mpc_real planned_w);
 
-/* mpc_empty_battery.c: power of a second in which the battery or the ramp needs the engine, that of the
- * ramp at least; 0 of any other */
-mpc_real mpc_empty_battery_w(const mpc_state *state, mpc_real ramp_w);
-
-/* mpc_last_run.c: power at which a run goes on for all that the plan still wants; 0 if it need not */
-mpc_real mpc_last_run_w(const mpc_state *state);
-
-/* mpc_heating_run.c: power at which it goes on for the heat that the coolant lacks; 0 likewise */
-mpc_real mpc_heating_run_w(const mpc_state *state);
+/* Where the coming second runs beside the plan, at its least-cost power power_w (mpc_polish.c); 0
+ * elsewhere. mpc_empty_battery.c: where the battery or the ramp needs the engine, with the ramp's power
+ * at least. mpc_last_run.c: where a run goes on for all that the plan still wants. mpc_heating_run.c:
+ * where it goes on for the heat that the coolant lacks. */
+mpc_real mpc_empty_battery_w(const mpc_state *state, mpc_real power_w, mpc_real ramp_w);
+mpc_real mpc_last_run_w(const mpc_state *state, const mpc_prices *prices, mpc_real power_w);
+mpc_real mpc_heating_run_w(const mpc_state *state, mpc_real power_w);
 
 /* mpc_ramp.c: what the ramp asks of the coming second */
 mpc_real mpc_ramp_least_w(const mpc_state *state);

@@ -9,7 +9,6 @@ The same in C: codegen/runtime/mpc_empty_battery.c.
 """
 
 from qpmpc.controllers.safety import SOC_MARGIN
-from qpmpc.qp.polish import Polish, Prices
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.parameters import Battery
 from qpmpc.vehicle.section import STEP_S
@@ -30,21 +29,20 @@ def empties(battery: Battery, maps: BatteryMaps, net_w: float, soc: float) -> bo
 
 
 def empty_battery_w(
-    battery: Battery, polish: Polish, prices: Prices, net_w: float, soc: float, ramp_w: float
+    battery: Battery, maps: BatteryMaps, net_w: float, soc: float, power_w: float, ramp_w: float
 ) -> float:
     """Return the power at which the engine runs because the battery needs it, W; 0 if it does not.
 
-    It does where the coming second would empty the battery or the ramp asks for power. That is the
-    least-cost power of the plan's prices then (`Polish`), what the ramp asks for at least: what it
-    gives beyond the second's need spares the next ones a start.
+    It does where the coming second would empty the battery or the ramp asks for power. That is its
+    least-cost power then, what the ramp asks for at least: what it gives beyond the second's need
+    spares the next ones a start.
 
     Parameters
     ----------
-    battery : its lower limit
-    polish, prices : of the plan
-    net_w, soc : as of `empties`
+    battery, maps, net_w, soc : as of `empties`
+    power_w : least-cost power of the second at the plan's prices, see `Polish`
     ramp_w : least power for the ramp, see `qpmpc.controllers.ramp`
     """
-    if ramp_w <= 0.0 and not empties(battery, polish.maps, net_w, soc):
+    if ramp_w <= 0.0 and not empties(battery, maps, net_w, soc):
         return 0.0
-    return max(polish.power_w(prices, net_w, 0.0), ramp_w)
+    return max(power_w, ramp_w)

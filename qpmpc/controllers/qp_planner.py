@@ -188,13 +188,14 @@ class QpPlanner(Planner):
             net_w = float(stages.net_w[0])
             if on_share[0] >= STAY_SHARE:
                 power_w[0] = polish.power_w(prices, net_w, float(power_w[0]))
-            battery, soc = vehicle.battery, seen.soc
-            least_w = max(least_w, empty_battery_w(battery, polish, prices, net_w, soc, least_w))
+            cheapest_w = polish.power_w(prices, net_w, 0.0)
+            battery, maps = vehicle.battery, polish.maps
+            empty_w = empty_battery_w(battery, maps, net_w, seen.soc, cheapest_w, least_w)
+            least_w = max(least_w, empty_w)
             if seen.engine_on:
-                going_w = last_run_w(vehicle.engine, polish, prices, stages, x[:, Var.INTERNAL])
-                heating_w = heating_run_w(
-                    vehicle, polish, prices, stages, x[:, Var.ON], seen.t_cl_degc
-                )
+                internal_w, on, t_cl_degc = x[:, Var.INTERNAL], x[:, Var.ON], seen.t_cl_degc
+                going_w = last_run_w(vehicle.engine, polish, prices, cheapest_w, stages, internal_w)
+                heating_w = heating_run_w(vehicle, polish.fuel, cheapest_w, stages, on, t_cl_degc)
                 least_w = max(least_w, going_w, heating_w)
         return Plan(
             on_share,

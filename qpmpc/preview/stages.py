@@ -71,6 +71,11 @@ class Stages:
             found[end] = after_j
         return found
 
+    @property
+    def must_s(self) -> float:
+        """Seconds ahead in which the engine must run."""
+        return float((self.duration_s * self.must_share).sum())
+
     def arrival_s(self, short_stages: int) -> int | None:
         """Seconds until arrival, None where that is beyond the first `short_stages` of 1 s."""
         count = len(self.seconds_w(short_stages))

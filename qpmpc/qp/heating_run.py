@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.preview.stages import Stages
+from qpmpc.pwa.fit import PwaFit
 from qpmpc.qp.coolant_floor import ARRIVAL_K
 from qpmpc.qp.last_run import MUST_LEAST_S
-from qpmpc.qp.polish import Polish, Prices
 from qpmpc.qp.rows import table_of
 from qpmpc.vehicle.engine import alpha_at
 from qpmpc.vehicle.heat import cooling_w, engine_w
@@ -23,8 +23,8 @@ IDLING_W = 1.0  # power that stands for idling: 0 would be no wish to run
 
 def heating_run_w(
     vehicle: Vehicle,
-    polish: Polish,
-    prices: Prices,
+    fuel: PwaFit,
+    power_w: float,
     stages: Stages,
     on_share: NDArray[np.float64],
     t_cl_degc: float,
@@ -35,7 +35,7 @@ def heating_run_w(
 
         J = C (T_cl,min + ARRIVAL_K - T) + sum_k h_k Q_out(T_cl,min, v_k)
 
-    With Q the heat of the engine at the least-cost power of the coming second (`Polish`) and b the
+    With Q the heat of the engine at the least-cost power of the coming second and b the
     shortest run, the run goes on if one more could give that, 0 < J <= b Q, while the plan wants no
     whole one, sum_k h_k sigma_k <= b, and no second ahead has to run anyway. Only where a start
     costs something. To be asked while the engine runs.
@@ -43,21 +43,21 @@ def heating_run_w(
     Parameters
     ----------
     vehicle : gives b, C, Q_out
-    polish, prices : of the plan
+    fuel : curve of the plan
+    power_w : that power at the plan's prices, see `Polish`
     stages : of the plan, from now on
     on_share : sigma of each stage by the plan, shape (n,)
     t_cl_degc : coolant now
     """
     engine, thermal = vehicle.engine, vehicle.thermal
-    must_s = float((stages.duration_s * stages.must_share).sum())
     wanted_s = float((stages.duration_s * np.maximum(on_share, 0.0)).sum())
-    if not table_of(engine).has_start or must_s > MUST_LEAST_S or wanted_s > engine.min_on_s:
+    has_to_run = stages.must_s > MUST_LEAST_S
+    if not table_of(engine).has_start or has_to_run or wanted_s > engine.min_on_s:
         return 0.0
     limit = thermal.t_cl_min_degc
     lack_j = thermal.heat_capacity_j_per_k * (limit + ARRIVAL_K - t_cl_degc)
     for h, speed_mps in zip(stages.duration_s.tolist(), stages.speed_mps.tolist(), strict=True):
         lack_j += h * cooling_w(thermal, limit, speed_mps)
-    power_w = polish.power_w(prices, float(stages.net_w[0]), 0.0)
     fuel_w = alpha_at(vehicle.cold_engine, t_cl_degc) * engine.lhv_j_per_g
-    heat_w = engine_w(thermal, fuel_w * float(polish.fuel(power_w)), power_w)
+    heat_w = engine_w(thermal, fuel_w * float(fuel(power_w)), power_w)
     return max(power_w, IDLING_W) if 0.0 < lack_j <= engine.min_on_s * heat_w else 0.0

@@ -24,12 +24,13 @@ def last_run_w(
     engine: Engine,
     polish: Polish,
     prices: Prices,
+    power_w: float,
     stages: Stages,
     internal_w: NDArray[np.float64],
 ) -> float:
     """Return the power at which a run goes on for all that the plan still wants; 0 if it need not.
 
-    With E the least-cost power of the coming second (`Polish`), g = l(P0) - l(P0 - E) what the
+    With E the least-cost power of the coming second, g = l(P0) - l(P0 - E) what the
     battery gains by it, d what that second costs more than one with the engine off, all at the
     plan's prices, and b the shortest run,
 
@@ -44,14 +45,13 @@ def last_run_w(
     ----------
     engine : gives b and c
     polish, prices : of the plan
+    power_w : E at those prices, see `Polish`
     stages : of the plan, from now on
     internal_w : G, internal battery power of each stage by the plan, shape (n,)
     """
-    must_s = float((stages.duration_s * stages.must_share).sum())
-    if not table_of(engine).has_start or must_s > MUST_LEAST_S:
+    if not table_of(engine).has_start or stages.must_s > MUST_LEAST_S:
         return 0.0
     net_w = float(stages.net_w[0])
-    power_w = polish.power_w(prices, net_w, 0.0)
     gain_w = float(stages.internal_off_w[0]) - polish.internal_w(net_w - power_w)
     if gain_w < LEAST_GAIN_W or prices.fuel < FUEL_LEAST:
         return 0.0

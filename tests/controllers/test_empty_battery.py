@@ -33,7 +33,8 @@ def test_it_empties_where_the_plant_ends_below_the_limit(above: float, demand_w:
     assert found is bool(after.soc < LIMIT + SOC_MARGIN)
     least_w = POLISH.power_w(PRICES, net_w, 0.0)
     asked = [
-        empty_battery_w(CAR.battery, POLISH, PRICES, net_w, soc, ramp_w) for ramp_w in (0.0, 9e3)
+        empty_battery_w(CAR.battery, POLISH.maps, net_w, soc, least_w, ramp_w)
+        for ramp_w in (0.0, 9e3)
     ]
     assert asked == [least_w if found else 0.0, max(least_w, 9e3)]
 

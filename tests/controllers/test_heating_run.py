@@ -30,7 +30,8 @@ def power_w(t_cl_degc: float, car=CAR, on_share: float = 0.0, must_share: float 
     net_w, zero = np.full(2, DRIVING_W), np.zeros(2)
     must = np.array([0.0, must_share])
     trip = Stages(h, net_w, zero + SPEED_MPS, off, must, net_w, off, zero, zero, zero)
-    return heating_run_w(car, POLISH, PRICES, trip, np.full(2, on_share), t_cl_degc)
+    going_w = POLISH.power_w(PRICES, DRIVING_W, 0.0)
+    return heating_run_w(car, POLISH.fuel, going_w, trip, np.full(2, on_share), t_cl_degc)
 
 
 def lasts_from_degc() -> float:

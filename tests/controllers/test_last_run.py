@@ -34,7 +34,8 @@ def stages(wanted_j: float, must_share: float = 0.0) -> tuple[Stages, np.ndarray
 
 def power_w(wanted_j: float, car=CAR, prices=PRICES, must_share: float = 0.0) -> float:
     trip, internal_w = stages(wanted_j, must_share)
-    return last_run_w(car.engine, POLISH, prices, trip, internal_w)
+    going_w = POLISH.power_w(prices, DRIVING_W, 0.0)
+    return last_run_w(car.engine, POLISH, prices, going_w, trip, internal_w)
 
 
 GOING_W = POLISH.power_w(PRICES, DRIVING_W, 0.0)
