@@ -201,14 +201,47 @@ static int32_t room_spacing(const mpc_forecast *forecast)
     return (needed > MPC_ROOM_S) ? needed : MPC_ROOM_S;
 }
 
+/* How far the battery's energy is below its last peak, after a second, from how far before it: what
+ * driving with the engine off takes, hard driving apart, less what braking gives. */
+static mpc_real drop_after_j(const mpc_forecast *forecast, int32_t second, mpc_real before_j)
+{
+    const mpc_real demand_w = forecast->trip.demand_w[second];
+    const mpc_real internal_w = drained_w(demand_w);
+    const mpc_real driving_w = (class_of(demand_w) == 0) ? REAL(0.0)
+                                                         : (mpc_par.swing_share * internal_w);
+    const mpc_real lost_w = (internal_w > REAL(0.0)) ? driving_w : internal_w;
+    return real_min(real_max(before_j + lost_w, REAL(0.0)), most_kept_j());
+}
+
+/* Seconds of a stretch. */
+static int32_t stretch_s(const mpc_forecast *forecast)
+{
+    const int32_t needed = (forecast->covered + (MPC_STRETCHES - 1)) / MPC_STRETCHES;
+    return (needed > MPC_STRETCH_S) ? needed : MPC_STRETCH_S;
+}
+
+/* The room at some places, and the most use of it in each stretch: for the braking to come, or for what
+ * the battery has lost since its last peak. */
 static void find_rooms(mpc_forecast *forecast)
 {
     const int32_t spacing = room_spacing(forecast);
+    const int32_t length_s = stretch_s(forecast);
     mpc_real room_j = REAL(0.0);
+    mpc_real drop_j = REAL(0.0);
     for (int32_t k = 0; k < MPC_ROOMS; k++) {
         forecast->room_j[k] = REAL(0.0);
     }
+    for (int32_t k = 0; k < MPC_STRETCHES; k++) {
+        forecast->use_j[k] = REAL(0.0);
+    }
+    for (int32_t second = 0; second < forecast->covered; second++) {
+        mpc_real *const use_j = &forecast->use_j[second / length_s];
+        drop_j = drop_after_j(forecast, second, drop_j);
+        *use_j = real_max(*use_j, drop_j);
+    }
     for (int32_t second = forecast->covered - 1; second >= 0; second--) {
+        mpc_real *const use_j = &forecast->use_j[second / length_s];
+        *use_j = real_max(*use_j, room_j);
         room_j = room_before_j(forecast, second, room_j);
         if ((second % spacing) == 0) {
             forecast->room_j[second / spacing] = room_j;
@@ -318,8 +351,8 @@ static void fill_short(const mpc_road *seen, mpc_in *in)
     }
 }
 
-/* What is kept at the end of a block: that of the place where it ends; nothing, if it is empty. At
- * arrival the memory is not looked at, which may be that of no forecast. */
+/* What is kept at the end of a block: that of the place where it ends; nothing, if it is empty. From the
+ * upper limit no more than a share of it beyond what there is a use for. At arrival the memory is not looked at, which may be that of no forecast. */
 static mpc_swing kept_of(const mpc_forecast *forecast, int32_t block, int32_t is_arriving)
 {
     mpc_swing kept = {REAL(0.0), REAL(0.0)};
@@ -328,42 +361,52 @@ static mpc_swing kept_of(const mpc_forecast *forecast, int32_t block, int32_t is
         const int32_t end = edge_of(forecast, forecast->next, block + 1);
         if (start < end) {
             kept = forecast->swing[(end - 1) / forecast->place_s];
+            const mpc_real use_j = forecast->use_j[(end - 1) / stretch_s(forecast)];
+            const mpc_real used_j = use_j + (SURE_SHARE * kept.rise_j);
+            kept.rise_j = real_max(real_min(kept.rise_j, used_j), LEAST_KEPT_J);
         }
     }
     return kept;
 }
 
+static void fill_class(const mpc_forecast *forecast, int32_t k, int32_t is_arriving, mpc_in *in)
+{
+    const mpc_class_sums *const of = &forecast->ahead[k];
+    const int32_t is_masked = ((is_arriving != 0) || (of->seconds == 0)) ? 1 : 0;
+    const mpc_real seconds = (is_masked != 0) ? REAL(1.0) : (mpc_real)of->seconds;
+    const mpc_real share = (is_masked != 0) ? REAL(0.0) : REAL(1.0);
+    in->long_duration_s[k] = share * seconds;
+    in->long_net_w[k] = share * mean_of(&of->net_w, seconds);
+    in->long_speed_mps[k] = share * mean_of(&of->speed_mps, seconds);
+    in->long_rises[k] = (is_arriving != 0) ? REAL(0.0) : (mpc_real)of->rises;
+    /* with one class the preview is averaged: it has only the mean demand */
+#if MPC_CLASSES > 1
+    in->long_internal_off_w[k] = share * mean_of(&of->internal_off_w, seconds);
+    in->long_must_share[k] = share * ((mpc_real)of->musts / seconds);
+    /* where none is free, the means of all */
+    const int32_t some = ((is_masked == 0) && (of->seconds > of->musts)) ? 1 : 0;
+    const mpc_real left_s = (mpc_real)of->seconds - (mpc_real)of->musts; /* no overflow */
+    const mpc_real free_s = (some != 0) ? left_s : REAL(1.0);
+    in->long_free_net_w[k] = (some != 0) ? mean_of(&of->free_net_w, free_s) : in->long_net_w[k];
+    in->long_free_internal_off_w[k] = (some != 0) ? mean_of(&of->free_internal_off_w, free_s)
+                                                  : in->long_internal_off_w[k];
+#else
+    in->long_must_share[k] = (mpc_real)must_run(in->long_net_w[k], in->long_speed_mps[k]);
+    in->long_internal_off_w[k] = mpc_map_planned_internal_w(in->long_net_w[k]);
+    in->long_free_net_w[k] = in->long_net_w[k];
+    in->long_free_internal_off_w[k] = in->long_internal_off_w[k];
+#endif
+}
+
 static void fill_long(const mpc_forecast *forecast, int32_t is_arriving, mpc_in *in)
 {
-    for (int32_t k = 0; k < MPC_LONG; k++) {
-        const mpc_class_sums *const of = &forecast->ahead[k];
-        const int32_t is_masked = ((is_arriving != 0) || (of->seconds == 0)) ? 1 : 0;
-        const mpc_real seconds = (is_masked != 0) ? REAL(1.0) : (mpc_real)of->seconds;
-        const mpc_real share = (is_masked != 0) ? REAL(0.0) : REAL(1.0);
-        in->long_duration_s[k] = share * seconds;
-        in->long_net_w[k] = share * mean_of(&of->net_w, seconds);
-        in->long_speed_mps[k] = share * mean_of(&of->speed_mps, seconds);
-        in->long_rises[k] = (is_arriving != 0) ? REAL(0.0) : (mpc_real)of->rises;
-        const mpc_swing swing = kept_of(forecast, k / MPC_CLASSES, is_arriving);
-        in->long_fall_j[k] = swing.fall_j;
-        in->long_rise_j[k] = swing.rise_j;
-        /* with one class the preview is averaged: it has only the mean demand */
-#if MPC_CLASSES > 1
-        in->long_internal_off_w[k] = share * mean_of(&of->internal_off_w, seconds);
-        in->long_must_share[k] = share * ((mpc_real)of->musts / seconds);
-        /* where none is free, the means of all */
-        const int32_t some = ((is_masked == 0) && (of->seconds > of->musts)) ? 1 : 0;
-        const mpc_real left_s = (mpc_real)of->seconds - (mpc_real)of->musts; /* no overflow */
-        const mpc_real free_s = (some != 0) ? left_s : REAL(1.0);
-        in->long_free_net_w[k] = (some != 0) ? mean_of(&of->free_net_w, free_s) : in->long_net_w[k];
-        in->long_free_internal_off_w[k] = (some != 0) ? mean_of(&of->free_internal_off_w, free_s)
-                                                      : in->long_internal_off_w[k];
-#else
-        in->long_must_share[k] = (mpc_real)must_run(in->long_net_w[k], in->long_speed_mps[k]);
-        in->long_internal_off_w[k] = mpc_map_planned_internal_w(in->long_net_w[k]);
-        in->long_free_net_w[k] = in->long_net_w[k];
-        in->long_free_internal_off_w[k] = in->long_internal_off_w[k];
-#endif
+    for (int32_t block = 0; block < MPC_BLOCKS; block++) {
+        const mpc_swing kept = kept_of(forecast, block, is_arriving);
+        for (int32_t k = block * MPC_CLASSES; k < ((block + 1) * MPC_CLASSES); k++) {
+            fill_class(forecast, k, is_arriving, in);
+            in->long_fall_j[k] = kept.fall_j;
+            in->long_rise_j[k] = kept.rise_j;
+        }
     }
 }
 

@@ -58,6 +58,11 @@ typedef struct {
 #define MPC_ROOMS 225
 #define MPC_ROOM_S 32
 
+/* Stretches of the trip in which the use of room in the battery is one number, and the seconds of each,
+ * or more in a trip of over two hours. */
+#define MPC_STRETCHES 900
+#define MPC_STRETCH_S 8
+
 /* Memory of one forecast. Its contents are private; the caller needs only its size. */
 typedef struct {
     uint32_t magic; /* tells a started forecast from any other memory, as does magic_end */
@@ -66,8 +71,9 @@ typedef struct {
     int32_t covered; /* seconds of the trip in them */
     int32_t next;    /* first second that is in the sums, where the first block begins */
     mpc_class_sums ahead[MPC_LONG];
-    mpc_swing swing[MPC_BLOCKS]; /* kept from the SOC limits at the end of each place */
-    mpc_real room_j[MPC_ROOMS];  /* for the braking from each of them on */
+    mpc_swing swing[MPC_BLOCKS];   /* kept from the SOC limits at the end of each place */
+    mpc_real room_j[MPC_ROOMS];    /* for the braking from each of them on */
+    mpc_real use_j[MPC_STRETCHES]; /* of room in the battery, in each stretch */
     uint32_t magic_end;
 } mpc_forecast;
 

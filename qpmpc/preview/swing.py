@@ -4,7 +4,8 @@ Inside a long block braking fills the battery and launches drain it. A plan that
 the block ends would end it at a limit; on the road the braking energy is then thrown away. So two
 numbers of each block's end go with its statistics: how far below and above it the battery's energy
 comes around there. They are found once, for as many fixed places of the trip as it has blocks, and
-a block has those of the place where it ends. A third goes with the short horizon, second by second:
+a block has those of the place where it ends; the upper only as far as there is use for it at its
+last second. A third goes with the short horizon, second by second:
 the room that the braking beyond it needs.
 """
 
@@ -27,6 +28,15 @@ DRAIN_SHARE = 0.8
 FILLED_SHARE = 0.5
 """Of the battery's energy between its limits: no more is kept from either limit. A long descent in
 the cold has no use for more room: the heat that it needs comes from an engine that charges."""
+
+
+SURE_SHARE = 0.2
+"""Of a place's rise, which the end of a block keeps beyond the use that is seen for it: the engine
+does not rest wherever it may."""
+
+
+STRETCHES, STRETCH_S = 900, 8
+"""Of the trip, each so long or longer in a trip of over two hours: in one `uses` is one number."""
 
 
 def swings(
@@ -101,6 +111,59 @@ def rooms(forecast: Trace, vehicle: Vehicle, settings: HorizonSettings) -> Float
     for step in range(forecast.steps - 1, -1, -1):
         needed[step] = min(max(needed[step + 1] - taken_w[step], 0.0), most)
     return needed
+
+
+def drops(forecast: Trace, vehicle: Vehicle, settings: HorizonSettings) -> Floats:
+    """Energy that the battery has lost by each second since it was highest, J.
+
+    With l the internal power with the engine off and s the share of the swing that is kept,
+
+        D_t+1 = max(D_t + l_t, 0) in braking,   D_t + s l_t in driving,   D_t in hard driving
+
+    and at most `FILLED_SHARE` of what the battery holds between its limits; 0 at departure. A
+    battery that now has less room than that has been at its limit. One class has none, as in
+    `rooms`.
+
+    Parameters
+    ----------
+    forecast : of the whole trip
+
+    Returns
+    -------
+    shape (steps + 1,)
+    """
+    found = np.zeros(forecast.steps + 1)
+    if settings.classes == 1:
+        return found
+    most = _most_j(vehicle)
+    internal_w = forecast.internal_off_w(vehicle)
+    driving_w = np.where(forecast.demand_w > settings.class_hard_w, 0.0, internal_w)
+    lost_w = np.where(internal_w > 0.0, settings.swing_share * driving_w, internal_w)
+    for step in range(forecast.steps):
+        found[step + 1] = min(max(found[step] + lost_w[step], 0.0), most)
+    return found
+
+
+def uses(room_j: Floats, drop_j: Floats) -> Floats:
+    """Energy below the upper SOC limit that there is a use for at the end of each second, J.
+
+    For the braking to come, or for what the battery has lost since it was highest: the most of
+    max(R, D) in the stretch of the trip around there, one of `STRETCHES` of `STRETCH_S` or more.
+
+    Parameters
+    ----------
+    room_j, drop_j : R and D of `rooms` and `drops`, shape (steps + 1,)
+
+    Returns
+    -------
+    shape (steps,)
+    """
+    of_second = np.maximum(room_j, drop_j)[1:]
+    steps = len(of_second)
+    length = max(STRETCH_S, -(-steps // STRETCHES))
+    most = np.maximum.reduceat(of_second, np.arange(0, steps, length))
+    found: Floats = np.repeat(most, length)[:steps]
+    return found
 
 
 def _most_j(vehicle: Vehicle) -> float:
