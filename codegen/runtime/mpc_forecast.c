@@ -352,7 +352,8 @@ static void fill_short(const mpc_road *seen, mpc_in *in)
 }
 
 /* What is kept at the end of a block: that of the place where it ends; nothing, if it is empty. From the
- * upper limit no more than a share of it beyond what there is a use for. At arrival the memory is not looked at, which may be that of no forecast. */
+ * upper limit no more than a share of it beyond what there is a use for. At arrival the memory is not
+ * looked at, which may be that of no forecast. */
 static mpc_swing kept_of(const mpc_forecast *forecast, int32_t block, int32_t is_arriving)
 {
     mpc_swing kept = {REAL(0.0), REAL(0.0)};

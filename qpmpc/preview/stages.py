@@ -250,7 +250,7 @@ class StageBuilder:
         fall and rise, shape (2, blocks * classes); 0 of an empty block
         """
         last = np.maximum(edges[1:] - 1, 0)
-        kept_j = self._swing_j[:, last // max(self._place_s, 1)].copy()
+        kept_j = self._swing_j[:, last // max(self._place_s, 1)]
         most_j = self._use_j[last] + SURE_SHARE * kept_j[1]
         kept_j[1] = np.maximum(np.minimum(kept_j[1], most_j), LEAST_KEPT_J)
         return np.repeat(kept_j * (np.diff(edges) > 0), self.settings.classes, axis=1)

@@ -4,9 +4,9 @@ Inside a long block braking fills the battery and launches drain it. A plan that
 the block ends would end it at a limit; on the road the braking energy is then thrown away. So two
 numbers of each block's end go with its statistics: how far below and above it the battery's energy
 comes around there. They are found once, for as many fixed places of the trip as it has blocks, and
-a block has those of the place where it ends; the upper only as far as there is use for it at its
-last second. A third goes with the short horizon, second by second:
-the room that the braking beyond it needs.
+a block has those of the place where it ends; the upper only as far as there is a use for it at its
+last second. A third goes with the short horizon, second by second: the room that the braking beyond
+it needs.
 """
 
 import numpy as np
