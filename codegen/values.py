@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from qpmpc.codegen.calibration import Calibration, calibration_of
 from qpmpc.codegen.forecast_values import fixed_block_s
 from qpmpc.codegen.shared_values import Sizes, shared_values
-from qpmpc.controllers import monitor, qp_planner, ramp, realise, safety
+from qpmpc.controllers import heating_run, monitor, qp_planner, ramp, realise, safety
 from qpmpc.controllers.qp_planner import DEPARTURE_LINEARISATIONS, WARM_UP_STEPS
 from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS
 from qpmpc.controllers.settings import MhQpSettings, RuleBasedSettings
@@ -18,7 +18,7 @@ from qpmpc.preview import checked, swing
 from qpmpc.pwa import learned_fuel
 from qpmpc.pwa.model import PwaModel
 from qpmpc.pwa.model import learned_fuel as learner_of
-from qpmpc.qp import coolant_floor, heating_run, last_run, linearisation, polish, rows, stage_qp
+from qpmpc.qp import coolant_floor, last_run, linearisation, polish, rows, stage_qp
 from qpmpc.qp.quantities import pieces_of
 from qpmpc.qp.rows import Rows, Table, table_of
 from qpmpc.qp.stage_qp import qp_parameters

@@ -1,7 +1,7 @@
 /* A run of the engine that goes on, where the coolant would not last to arrival without one more:
  * a plan of shares rounds away what it lacks, the road makes a whole run of it.
  *
- * The same in Python, with the rule: qpmpc/qp/heating_run.py.
+ * The same in Python, with the rule: qpmpc/controllers/heating_run.py.
  */
 #include "mpc_constants.h"
 #include "mpc_heat.h"
@@ -17,16 +17,18 @@ mpc_real mpc_heating_run_w(const mpc_state *state, mpc_real power_w)
                             * mpc_qp_least_fuel(state, power_w, REAL(1.0));
     const mpc_real run_s = (mpc_real)mpc_par.min_on_s;
     const mpc_real run_j = run_s * heat_engine_w(fuel_w, power_w);
-    mpc_real lack_j = mpc_par.heat_capacity_j_per_k
-                      * ((cal->t_cl_min_degc + ARRIVAL_K) - t_cl_degc);
+    mpc_real lasts_degc = cal->t_cl_min_degc + T_CL_MARGIN_K;
     mpc_real must_s = REAL(0.0);
     mpc_real wanted_s = REAL(0.0);
-    for (int32_t k = 0; k < MPC_STAGES; k++) {
+    for (int32_t k = MPC_STAGES - 1; k >= 0; k--) {
         const mpc_stage_road *const road = &state->stage[k].road;
-        lack_j += road->duration_s * heat_cooling_w(cal->t_cl_min_degc, road->speed_mps);
+        const mpc_real per_w = road->duration_s / mpc_par.heat_capacity_j_per_k;
+        const mpc_real half_k = (REAL(0.5) * per_w) * heat_cooling_w(lasts_degc, road->speed_mps);
+        lasts_degc += per_w * heat_cooling_w(lasts_degc + half_k, road->speed_mps);
         must_s += road->duration_s * road->must_share;
         wanted_s += road->duration_s * real_max(state->stage[k].x[MPC_VAR_ON], REAL(0.0));
     }
+    const mpc_real lack_j = mpc_par.heat_capacity_j_per_k * (lasts_degc - t_cl_degc);
     const int32_t is_lacking = ((lack_j > REAL(0.0)) && (lack_j <= run_j)) ? 1 : 0;
     const int32_t is_wanted = ((wanted_s <= run_s) && (must_s <= MUST_LEAST_S)) ? is_lacking : 0;
     const int32_t is_asked =

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.controllers.empty_battery import empty_battery_w
+from qpmpc.controllers.heating_run import heating_run_w
 from qpmpc.controllers.monitor import Flag
 from qpmpc.controllers.qp_certificate import certificate_of
 from qpmpc.controllers.ramp import RampFloor
@@ -18,7 +19,6 @@ from qpmpc.preview.stages import Stages
 from qpmpc.pwa.learned_fuel import LearnedFuel
 from qpmpc.pwa.model import PwaModel, learned_fuel
 from qpmpc.qp.expectation import expectation
-from qpmpc.qp.heating_run import heating_run_w
 from qpmpc.qp.last_run import last_run_w
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.polish import Polish

@@ -9,14 +9,14 @@ The same in C: codegen/runtime/mpc_heating_run.c.
 import numpy as np
 from numpy.typing import NDArray
 
+from qpmpc.controllers.safety import T_CL_MARGIN_K
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.fit import PwaFit
-from qpmpc.qp.coolant_floor import ARRIVAL_K
 from qpmpc.qp.last_run import MUST_LEAST_S
 from qpmpc.qp.rows import table_of
 from qpmpc.vehicle.engine import alpha_at
 from qpmpc.vehicle.heat import cooling_w, engine_w
-from qpmpc.vehicle.parameters import Vehicle
+from qpmpc.vehicle.parameters import Thermal, Vehicle
 
 IDLING_W = 1.0  # power that stands for idling: 0 would be no wish to run
 
@@ -31,9 +31,13 @@ def heating_run_w(
 ) -> float:
     """Return the power at which a run goes on for the heat that is missing; 0 if it need not.
 
-    What the coolant lacks to last to arrival with the engine at rest is
+    With the engine at rest the coolant lasts to arrival from T_0, backwards from the end
 
-        J = C (T_cl,min + ARRIVAL_K - T) + sum_k h_k Q_out(T_cl,min, v_k)
+        T_k-1 = T_k + h_k Q_out(T_k + h_k Q_out(T_k, v_k) / 2 C, v_k) / C
+
+    with T_n = T_cl,min + `T_CL_MARGIN_K`, which the safety layer keeps, and lacks J = C (T_0 - T).
+    It loses more the warmer it is: by the losses at the limit three minutes from 44 degC would seem
+    to end 0.2 K warmer.
 
     With Q the heat of the engine at the least-cost power of the coming second and b the
     shortest run, the run goes on if one more could give that, 0 < J <= b Q, while the plan wants no
@@ -54,10 +58,19 @@ def heating_run_w(
     has_to_run = stages.must_s > MUST_LEAST_S
     if not table_of(engine).has_start or has_to_run or wanted_s > engine.min_on_s:
         return 0.0
-    limit = thermal.t_cl_min_degc
-    lack_j = thermal.heat_capacity_j_per_k * (limit + ARRIVAL_K - t_cl_degc)
-    for h, speed_mps in zip(stages.duration_s.tolist(), stages.speed_mps.tolist(), strict=True):
-        lack_j += h * cooling_w(thermal, limit, speed_mps)
+    lack_j = thermal.heat_capacity_j_per_k * (_lasts_from_degc(thermal, stages) - t_cl_degc)
     fuel_w = alpha_at(vehicle.cold_engine, t_cl_degc) * engine.lhv_j_per_g
     heat_w = engine_w(thermal, fuel_w * float(fuel(power_w)), power_w)
     return max(power_w, IDLING_W) if 0.0 < lack_j <= engine.min_on_s * heat_w else 0.0
+
+
+def _lasts_from_degc(thermal: Thermal, stages: Stages) -> float:
+    """Return the coolant that with the engine at rest just needs no start before arrival, T_0."""
+    t_cl_degc = thermal.t_cl_min_degc + T_CL_MARGIN_K
+    for h, speed_mps in zip(
+        stages.duration_s[::-1].tolist(), stages.speed_mps[::-1].tolist(), strict=True
+    ):
+        per_w = h / thermal.heat_capacity_j_per_k
+        middle_degc = t_cl_degc + 0.5 * per_w * cooling_w(thermal, t_cl_degc, speed_mps)
+        t_cl_degc += per_w * cooling_w(thermal, middle_degc, speed_mps)
+    return t_cl_degc
