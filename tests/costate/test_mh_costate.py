@@ -67,7 +67,7 @@ def test_the_search_does_not_stand_still_where_the_coolant_is_at_its_limit_for_l
     controller, state = make_controller("mh-costate", trip), trip.plant.initial_state()
     controller.begin(trip)
     found = []
-    for step in range(20):
+    for step in range(100):  # of 20 the median is between 4 and 9 g, of 100 it is 4
         seen = trip.observation(step, state)
         decision = controller.decide(seen)
         found.append(decision.certificate_g)
