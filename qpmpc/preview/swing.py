@@ -33,8 +33,6 @@ the cold has no use for more room: the heat that it needs comes from an engine t
 SURE_SHARE = 0.2
 """Of a place's rise, which the end of a block keeps beyond the use that is seen for it: the engine
 does not rest wherever it may."""
-
-
 STRETCHES, STRETCH_S = 900, 8
 """Of the trip, each so long or longer in a trip of over two hours: in one `uses` is one number."""
 
@@ -102,15 +100,9 @@ def rooms(forecast: Trace, vehicle: Vehicle, settings: HorizonSettings) -> Float
     -------
     shape (steps + 1,)
     """
-    needed = np.zeros(forecast.steps + 1)
-    if settings.classes == 1:
-        return needed
-    most = _most_j(vehicle)
     internal_w = forecast.internal_off_w(vehicle)
     taken_w = np.where(internal_w > 0.0, DRAIN_SHARE * internal_w, internal_w)
-    for step in range(forecast.steps - 1, -1, -1):
-        needed[step] = min(max(needed[step + 1] - taken_w[step], 0.0), most)
-    return needed
+    return _levels(-taken_w[::-1], vehicle, settings)[::-1]
 
 
 def drops(forecast: Trace, vehicle: Vehicle, settings: HorizonSettings) -> Floats:
@@ -132,16 +124,10 @@ def drops(forecast: Trace, vehicle: Vehicle, settings: HorizonSettings) -> Float
     -------
     shape (steps + 1,)
     """
-    found = np.zeros(forecast.steps + 1)
-    if settings.classes == 1:
-        return found
-    most = _most_j(vehicle)
     internal_w = forecast.internal_off_w(vehicle)
     driving_w = np.where(forecast.demand_w > settings.class_hard_w, 0.0, internal_w)
     lost_w = np.where(internal_w > 0.0, settings.swing_share * driving_w, internal_w)
-    for step in range(forecast.steps):
-        found[step + 1] = min(max(found[step] + lost_w[step], 0.0), most)
-    return found
+    return _levels(lost_w, vehicle, settings)
 
 
 def uses(room_j: Floats, drop_j: Floats) -> Floats:
@@ -163,6 +149,22 @@ def uses(room_j: Floats, drop_j: Floats) -> Floats:
     length = max(STRETCH_S, -(-steps // STRETCHES))
     most = np.maximum.reduceat(of_second, np.arange(0, steps, length))
     found: Floats = np.repeat(most, length)[:steps]
+    return found
+
+
+def _levels(rise_w: Floats, vehicle: Vehicle, settings: HorizonSettings) -> Floats:
+    """Sum of 1 s steps from 0, clipped after each to 0 and `_most_j`; 0 with one class.
+
+    Returns
+    -------
+    shape (steps + 1,)
+    """
+    found = np.zeros(len(rise_w) + 1)
+    if settings.classes == 1:
+        return found
+    most = _most_j(vehicle)
+    for step, rise in enumerate(rise_w):
+        found[step + 1] = min(max(found[step] + rise, 0.0), most)
     return found
 
 
