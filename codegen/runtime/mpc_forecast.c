@@ -188,17 +188,16 @@ static void find_swings(mpc_forecast *forecast)
  * braking gives, less a share of what driving with the engine off takes. */
 static mpc_real room_before_j(const mpc_forecast *forecast, int32_t second, mpc_real next_j)
 {
-    const mpc_real internal_w =
-        mpc_map_planned_internal_w(battery_side_w(forecast->trip.demand_w[second]));
+    const mpc_real internal_w = drained_w(forecast->trip.demand_w[second]);
     const mpc_real taken_w = (internal_w > REAL(0.0)) ? (DRAIN_SHARE * internal_w) : internal_w;
     return real_min(real_max(next_j - taken_w, REAL(0.0)), most_kept_j());
 }
 
-/* Seconds between two places at which the room is kept. */
-static int32_t room_spacing(const mpc_forecast *forecast)
+/* Seconds from one place of the trip to the next, if there are so many places, so far apart or more. */
+static int32_t spacing_s(const mpc_forecast *forecast, int32_t places, int32_t least_s)
 {
-    const int32_t needed = (forecast->covered + (MPC_ROOMS - 1)) / MPC_ROOMS;
-    return (needed > MPC_ROOM_S) ? needed : MPC_ROOM_S;
+    const int32_t needed = (forecast->covered + (places - 1)) / places;
+    return (needed > least_s) ? needed : least_s;
 }
 
 /* How far the battery's energy is below its last peak, after a second, from how far before it: what
@@ -213,19 +212,12 @@ static mpc_real drop_after_j(const mpc_forecast *forecast, int32_t second, mpc_r
     return real_min(real_max(before_j + lost_w, REAL(0.0)), most_kept_j());
 }
 
-/* Seconds of a stretch. */
-static int32_t stretch_s(const mpc_forecast *forecast)
-{
-    const int32_t needed = (forecast->covered + (MPC_STRETCHES - 1)) / MPC_STRETCHES;
-    return (needed > MPC_STRETCH_S) ? needed : MPC_STRETCH_S;
-}
-
 /* The room at some places, and the most use of it in each stretch: for the braking to come, or for what
  * the battery has lost since its last peak. */
 static void find_rooms(mpc_forecast *forecast)
 {
-    const int32_t spacing = room_spacing(forecast);
-    const int32_t length_s = stretch_s(forecast);
+    const int32_t spacing = spacing_s(forecast, MPC_ROOMS, MPC_ROOM_S);
+    const int32_t length_s = spacing_s(forecast, MPC_STRETCHES, MPC_STRETCH_S);
     mpc_real room_j = REAL(0.0);
     mpc_real drop_j = REAL(0.0);
     for (int32_t k = 0; k < MPC_ROOMS; k++) {
@@ -255,7 +247,7 @@ static mpc_real room_from_j(const mpc_forecast *forecast, int32_t from)
     mpc_real room_j = REAL(0.0);
 #if MPC_CLASSES > 1
     if ((from >= 0) && (from < forecast->covered)) {
-        const int32_t spacing = room_spacing(forecast);
+        const int32_t spacing = spacing_s(forecast, MPC_ROOMS, MPC_ROOM_S);
         const int32_t place = (from / spacing) + 1;
         int32_t second = forecast->covered;
         if ((place * spacing) < forecast->covered) {
@@ -362,7 +354,8 @@ static mpc_swing kept_of(const mpc_forecast *forecast, int32_t block, int32_t is
         const int32_t end = edge_of(forecast, forecast->next, block + 1);
         if (start < end) {
             kept = forecast->swing[(end - 1) / forecast->place_s];
-            const mpc_real use_j = forecast->use_j[(end - 1) / stretch_s(forecast)];
+            const mpc_real use_j =
+                forecast->use_j[(end - 1) / spacing_s(forecast, MPC_STRETCHES, MPC_STRETCH_S)];
             const mpc_real used_j = use_j + (SURE_SHARE * kept.rise_j);
             kept.rise_j = real_max(real_min(kept.rise_j, used_j), LEAST_KEPT_J);
         }
