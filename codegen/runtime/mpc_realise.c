@@ -81,8 +81,8 @@ static int32_t keeps(const mpc_state *state, int32_t first, int32_t wish)
     return result;
 }
 
-/* Command of the second of the plan that has come, at the power E / on_share of the next second in
- * which the plan runs. */
+/* Command of the second of the plan that has come, at the power E / on_share of the next second before
+ * arrival in which the plan runs; the stages behind it keep what they held before. */
 mpc_command mpc_realise(const mpc_state *state)
 {
     const mpc_measured *const seen = &state->watch.good;
@@ -102,7 +102,9 @@ mpc_command mpc_realise(const mpc_state *state)
     }
     mpc_command command = {REAL(0.0), on};
     int32_t is_found = 0;
-    for (int32_t k = first; k < MPC_SHORT; k++) {
+    const int32_t left_s = state->old_arrival_s - first;
+    const int32_t seconds = (left_s < 1) ? 1 : left_s;
+    for (int32_t k = first; k < (first + seconds); k++) {
         const mpc_real share = state->old_on_share[k];
         const mpc_real least = (k == first) ? stay_share(state) : threshold;
         if ((on != 0) && (is_found == 0) && (share >= least)) {

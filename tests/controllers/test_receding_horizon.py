@@ -31,6 +31,16 @@ NYCC = load_cycle("nycc")
 PART = Cycle.from_samples("part", np.arange(121), NYCC.speed_mps[60:181])
 
 
+class RunsOn(Planner):
+    """Wants 1 W for its run to go on, and has old values in the stages behind the arrival."""
+
+    name = "runs-on"
+
+    def plan(self, seen: Observation) -> Plan:
+        share = np.array([0.1, 0.0, 0.0, 0.52, 0.52])
+        return Plan.of_means(share, 20e3 * share, arrival_s=3, least_w=1.0, stay_share=0.35)
+
+
 class Failing(Osqp):
     """OSQP that fails in chosen solves on the road, and keeps what it was started from."""
 
@@ -66,6 +76,13 @@ def driven(planner: Planner) -> tuple[list[str], list[Command]]:
     controller = RecedingHorizon(planner.trip, planner)
     drive(planner.trip, controller, on_step=lambda _, decision: decisions.append(decision))
     return [d.fallback for d in decisions], [d.command for d in decisions]
+
+
+def test_power_is_not_that_of_stages_behind_the_arrival() -> None:
+    """They keep what they held before: 12 kW for the heat of an engine at idle, 0.7 g."""
+    trip = Trip(PART)
+    seen = trip.start._replace(engine_on=True, soc=0.6, t_cl_degc=60.0, demand_w=0.0)
+    assert RecedingHorizon(trip, RunsOn(trip)).step(seen).command == Command(True, 1.0)
 
 
 def test_plan_then_shifted_plan_for_some_steps_then_rules_then_plan() -> None:
