@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from qpmpc.codegen.calibration import Calibration, calibration_of
 from qpmpc.codegen.forecast_values import fixed_block_s
 from qpmpc.codegen.shared_values import Sizes, shared_values
-from qpmpc.controllers import heating_run, monitor, qp_planner, ramp, realise, safety
+from qpmpc.controllers import heating_run, monitor, qp_planner, realise, safety
 from qpmpc.controllers.qp_planner import DEPARTURE_LINEARISATIONS, WARM_UP_STEPS
 from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS
 from qpmpc.controllers.settings import MhQpSettings, RuleBasedSettings
@@ -40,7 +40,6 @@ def of_modules(*modules: tuple[ModuleType, str]) -> dict[str, dict[str, float]]:
 
 
 CONSTANTS_OF_ALL = of_modules(
-    (ramp, "SOC_KEPT"),
     (linearisation, "COLDEST_DEGC HOTTEST_DEGC DEPARTURE_FUEL_G_PER_S DEPARTURE_P_ENG_W"),
     (safety, "POWER_MARGIN_W SOC_MARGIN T_CL_MARGIN_K"),
     (monitor, "LONG_AGO_S LONGEST_GAP_S"),
@@ -58,7 +57,7 @@ CONSTANTS = CONSTANTS_OF_ALL | of_modules(
     (heating_run, "IDLING_W"),
     (last_run, "LEAST_GAIN_W WANTED_LEAST FUEL_LEAST MUST_LEAST_S"),
     (realise, "STAY_S STAY_SHARE"),
-    (rows, "SHORTEST_SCALE_S SIGMA_FORCED COOL_SHARE MOOT_G_PER_S"),
+    (rows, "SHORTEST_SCALE_S SIGMA_FORCED COOL_SHARE SOC_KEPT MOOT_G_PER_S"),
 )
 
 OF_LEARNING = {  # beside those, where the fuel map is learned

@@ -57,6 +57,30 @@ static int32_t edge_of(const mpc_forecast *forecast, int32_t first, int32_t bloc
     return (edge < forecast->covered) ? edge : forecast->covered;
 }
 
+/* Whether the engine must run in a second of the trip; not before departure. */
+static int32_t must_at(const mpc_forecast *forecast, int32_t second)
+{
+    int32_t must = 0;
+    if (second >= 0) {
+        must = must_run(battery_side_w(forecast->trip.demand_w[second]),
+                        forecast->trip.speed_mps[second]);
+    }
+    return must;
+}
+
+/* Whether it runs then because it must, or had to begin a run lately, which lasts. */
+static int32_t runs_at(const mpc_forecast *forecast, int32_t second)
+{
+    int32_t runs = must_at(forecast, second);
+    int32_t earlier = must_at(forecast, second - 1);
+    for (int32_t late = 1; late < mpc_par.min_on_s; late++) {
+        const int32_t before = must_at(forecast, (second - late) - 1);
+        runs |= earlier & (1 - before);
+        earlier = before;
+    }
+    return runs;
+}
+
 /* Add one second of the trip to its class in a block, or subtract it: times 1 or -1. */
 static void count(mpc_forecast *forecast, int32_t of_block, int32_t second, int32_t times)
 {
@@ -73,7 +97,7 @@ static void count(mpc_forecast *forecast, int32_t of_block, int32_t second, int3
         block[i].rises += times;
     }
     to->seconds += times;
-    const int32_t must = must_run(net_w, forecast->trip.speed_mps[second]);
+    const int32_t must = runs_at(forecast, second);
     const mpc_real if_free = (must != 0) ? REAL(0.0) : sign;
     const mpc_real off_w = mpc_map_planned_internal_w(net_w);
     to->musts += times * must;

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.controllers.safety import POWER_MARGIN_W
+from qpmpc.qp.rows import SOC_KEPT
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.parameters import Vehicle
-
-SOC_KEPT = 1e-3  # from the lower limit: a demand that swings takes more than its mean
 
 
 class RampFloor:

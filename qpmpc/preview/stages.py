@@ -10,7 +10,7 @@ from qpmpc.preview.forecast import Trace, internal_off_w
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.preview.place import forecast_seconds
 from qpmpc.preview.swing import LEAST_KEPT_J, NO_LIMIT_J, SURE_SHARE, drops, rooms, swings, uses
-from qpmpc.vehicle.must_run import begun_s, must_run, too_fast
+from qpmpc.vehicle.must_run import begun_s, must_run, too_fast, whole_runs
 from qpmpc.vehicle.parameters import Vehicle
 
 LEAST_SHARE = 1e-6  # of a second in a day: below it is rounding
@@ -32,7 +32,8 @@ class Stages:
     speed_mps : mean speed
     internal_off_w : mean of the internal battery power l(P0) with the engine off; by convexity
         more than l of the mean, which an averaged preview (one class) has to use
-    must_share : share of its seconds in which the engine must run (`qpmpc.vehicle.must_run`)
+    must_share : share of its seconds in which the engine must run (`qpmpc.vehicle.must_run`), in a
+        block also of those in which it does because it had to start just before (`whole_runs`)
     free_net_w, free_internal_off_w : means of P0 and l(P0) over the other seconds, in which the
         engine may be off; of a stage without such seconds those of all
     rises : r_k, starts of the engine in the stage per on-share that it has more than the stage
@@ -197,7 +198,7 @@ class StageBuilder:
         n, seen = self.settings.short_stages, preview.short_count
         fields = np.zeros((FIELDS, self.count))
         trace = Trace(preview.short_demand_w[:seen], preview.short_speed_mps[:seen])
-        fields[:, :seen] = _fields(trace, self._vehicle)
+        fields[:, :seen] = _fields(trace, self._vehicle, _must(trace, self._vehicle))
         fields[OF_FREE, :seen] = fields[OF_ALL, :seen]  # of one second: its own
         long = preview.long
         fields[:, n:] = (
@@ -280,11 +281,15 @@ class StageBuilder:
         return source
 
 
-def _fields(trace: Trace, vehicle: Vehicle) -> NDArray[np.float64]:
+def _must(trace: Trace, vehicle: Vehicle) -> NDArray[np.bool_]:
+    """Whether the engine must run, second by second."""
+    return must_run(vehicle, trace.battery_side_w(vehicle), trace.speed_mps)
+
+
+def _fields(trace: Trace, vehicle: Vehicle, must: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Fields of each second, in the order of `Stages`; `OF_FREE` is 0 where there is no choice."""
     net_w = trace.battery_side_w(vehicle)
     off_w = trace.internal_off_w(vehicle)
-    must = must_run(vehicle, net_w, trace.speed_mps)
     free = ~must
     return np.stack(
         [np.ones(trace.steps), net_w, trace.speed_mps, off_w, must, free * net_w, free * off_w]
@@ -315,7 +320,7 @@ def _cumulative(
     -------
     shape (classes, FIELDS, steps + 1)
     """
-    fields = _fields(forecast, vehicle)
+    fields = _fields(forecast, vehicle, whole_runs(vehicle, _must(forecast, vehicle)))
     member = demand_class == np.arange(classes)[:, None]
     sums = np.zeros((classes, FIELDS, forecast.steps + 1))
     np.cumsum(fields[None] * member[:, None], axis=2, out=sums[:, :, 1:])

@@ -26,6 +26,7 @@ from qpmpc.vehicle.engine_parameters import Engine
 SHORTEST_SCALE_S = 1.0  # a masked stage is scaled as one of 1 s
 LEAST_FORCED = 1e-6  # share of the seconds without a choice: of a stage that has none
 COOL_SHARE = 0.5  # of the SOC reserve, where the thermostat is closed
+SOC_KEPT = 1e-3  # from the lower limit: at the limit itself the safety layer starts the engine
 MOOT_G_PER_S = 5.0  # a bound on fuel that is never met
 SIGMA_FORCED = 0.99  # "engine must be on" as a lower bound on sigma, kept apart from the upper one
 
@@ -81,7 +82,7 @@ spent_soc = running(duration_s * pwa_battery(strongest_w) / battery_energy_j)
 reach_soc = start_soc - spent_soc - reach_margin_soc
 wanted_soc = soc_reserve * where(about_t_cl_degc > thermostat_open_degc, 1.0, COOL_SHARE)
 reserve_soc = where(fall_j > 0.0, max(wanted_soc - refill_j / battery_energy_j, 0.0), 0.0)
-limit_soc = max(soc_min + fall_j / battery_energy_j, -1.0) + reserve_soc
+limit_soc = max(soc_min + SOC_KEPT + fall_j / battery_energy_j, -1.0) + reserve_soc
 top_soc = min(soc_max - rise_j / battery_energy_j, 2.0)
 last_low_soc = where(soc_penalty_g > 0.0, limit_soc, terminal_soc_low)
 last_high_soc = where(soc_penalty_g > 0.0, top_soc, terminal_soc_high)

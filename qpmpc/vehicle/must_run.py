@@ -43,6 +43,23 @@ def begun_s(vehicle: Vehicle, engine_on: bool, engine_for_s: int) -> int:
     return max(vehicle.engine.min_on_s - engine_for_s, 0) if engine_on else 0
 
 
+def whole_runs(vehicle: Vehicle, must: Bools) -> Bools:
+    """Return the seconds in which the engine runs because it must, or must have lately.
+
+    A run that begins because the engine must lasts `engine.min_on_s` seconds.
+
+    Parameters
+    ----------
+    must : whether the engine must run, second by second, shape (n,)
+    """
+    begins = must.copy()
+    begins[1:] &= ~must[:-1]
+    runs = must.copy()
+    for late in range(1, vehicle.engine.min_on_s):
+        runs[late:] |= begins[:-late]
+    return runs
+
+
 @overload
 def must_run(vehicle: Vehicle, net_w: float, speed_mps: float) -> bool: ...
 @overload

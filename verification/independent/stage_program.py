@@ -64,6 +64,10 @@ def horizon(
     give = np.minimum(net, equations.discharge_max_w)
     off = equations.internal_w(_mean_soc(vehicle), give)
     must = (net > equations.discharge_max_w) | (speed - vehicle.engine.electric_max_mps >= 1e-5)
+    runs = must.copy()  # a run that the engine has to begin lasts
+    for t in np.flatnonzero(must):
+        if t == 0 or not must[t - 1]:
+            runs[t : t + vehicle.engine.min_on_s] = True
     steps = cycle.steps
     n = grid.short_stages
     rows: list[list[float]] = []
@@ -83,8 +87,8 @@ def horizon(
         for member, entries in zip(classes, ([], into_hard, off_braking), strict=True):
             means = [0.0] * 6
             if member:
-                free = [t for t in member if not must[t]] or member
-                means = [float(np.mean(a[member])) for a in (net, speed, off, must)]
+                free = [t for t in member if not runs[t]] or member
+                means = [float(np.mean(a[member])) for a in (net, speed, off, runs)]
                 means += [float(np.mean(a[free])) for a in (net, off)]
             swing = [-np.inf, -np.inf]  # inside a block SOC is not limited
             rows.append([float(len(member)), *means, -grid.rise_share * len(entries), *swing])
@@ -422,7 +426,7 @@ def stage_program(
         strongest = max(net - engine.power_max_w, -equations.charge_max_w)
         charged = float(np.max(curves.battery.slope * strongest + curves.battery.intercept))
         reach -= h * charged / energy
-        low = battery.soc_min + float(road.low_j[k]) / energy
+        low = battery.soc_min + 1e-3 + float(road.low_j[k]) / energy
         high = battery.soc_max - float(road.high_j[k]) / energy
         if road.low_j[k] > 0.0:  # a block ends: a reserve is left, half of it where cool
             part = 1.0 if t0 > th.thermostat_open_degc else 0.5

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from qpmpc.preview.stages import Stages
 from qpmpc.qp.coolant_floor import CoolantFloor
 from qpmpc.qp.heat_reserve import heat_reserve_k
-from qpmpc.qp.rows import COOL_SHARE, SHORTEST_SCALE_S, SIGMA_FORCED, Var, table_of
+from qpmpc.qp.rows import COOL_SHARE, SHORTEST_SCALE_S, SIGMA_FORCED, SOC_KEPT, Var, table_of
 from qpmpc.qp.settings import QpSettings
 from qpmpc.qp.stage_qp import T_CL_MAX_MARGIN_K
 from qpmpc.vehicle.battery import BatteryMaps
@@ -290,7 +290,7 @@ class NlpProblem:
         maps = BatteryMaps(battery)
         energy_j = maps.energy_j(trip.soc_mean)
         reserve = settings.soc_reserve * max(trip.soc_lower_end - battery.soc_min, 0.0)
-        low = np.maximum(battery.soc_min + stages.fall_j / energy_j, EMPTY)
+        low = np.maximum(battery.soc_min + SOC_KEPT + stages.fall_j / energy_j, EMPTY)
         kept = reserve * np.where(is_hot, 1.0, COOL_SHARE) - stages.refill_j / energy_j
         low += np.where(stages.fall_j > 0.0, np.maximum(kept, 0.0), 0.0)
         high = np.minimum(battery.soc_max - stages.rise_j / energy_j, FULL)
