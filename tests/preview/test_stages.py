@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from qpmpc.cycles import load_cycle
 from qpmpc.preview import HorizonSettings, StageBuilder, Trace
 from qpmpc.vehicle import load_vehicle
-from qpmpc.vehicle.must_run import must_run
+from qpmpc.vehicle.must_run import must_run, whole_runs
 
 VEHICLE = load_vehicle()
 NYCC = Trace.of(load_cycle("nycc"), VEHICLE)
@@ -95,7 +95,7 @@ def test_means_of_the_seconds_with_a_choice_are_those_of_their_seconds(classes):
     layout = HorizonSettings(classes=classes)
     builder = StageBuilder(car, trace, trace, layout)
     net, off = trace.battery_side_w(car), trace.internal_off_w(car)
-    must = must_run(car, net, trace.speed_mps)
+    must = whole_runs(car, must_run(car, net, trace.speed_mps))
     long = builder.preview(0).long
     edges, mixed = layout.edges(layout.short_stages, trace.steps), 0
     for block in range(layout.blocks):
