@@ -39,7 +39,8 @@ typedef struct {
      * easy driving, braking): seconds, mean of the net power P0 = demand + auxiliaries (each
      * second clipped at the battery's charge limit before the mean is taken), mean speed, mean of
      * the internal battery power l(P0) with the engine off, share of the seconds in which the engine
-     * must run (P0 beyond the battery's limit, or too fast for an engine that is off), means of P0
+     * must run (P0 beyond the battery's limit, or too fast for an engine that is off; likewise the
+     * seconds after the first of such ones, until a shortest run has ended), means of P0
      * and l(P0) over the other seconds (over all, where there are none); and how often the demand
      * rises into that class or past it, which matters where starts of the engine cost something (0
      * if it is not known: they are then counted over the short horizon alone). 0 seconds where
