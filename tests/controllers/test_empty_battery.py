@@ -58,6 +58,22 @@ def test_no_second_at_the_limit_is_driven_at_a_poor_power(monkeypatch) -> None:
     assert fuel_g[1] > 1.03 * fuel_g[0]
 
 
+def test_a_plan_at_the_lower_limit_starts_no_engine_for_a_few_watts(monkeypatch) -> None:
+    """It rides above the limit; at it the safety layer started the engine for 4 s at idle."""
+    known = {"thermal.t_amb_degc": 8.611857, "trip.soc_init": 0.420356}
+    known |= {"trip.t_cl_init_degc": 73.198936, "mh_qp.implementation": "python"}
+
+    def least_of_runs_w() -> float:
+        run = qpmpc.simulate("train-042", "mh-qp", vehicle="prius-liion", settings=known)
+        on, power_w = run.trajectory.engine_on, run.trajectory.p_eng_w
+        begins = np.flatnonzero(on & ~np.concatenate([[False], on[:-1]]))
+        return min(float(power_w[begin : begin + 4].mean()) for begin in begins)
+
+    assert least_of_runs_w() > POOR_W
+    monkeypatch.setattr("qpmpc.qp.rows.SOC_KEPT", 0.0)
+    assert least_of_runs_w() < 100.0
+
+
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 def test_c_runs_as_python_does() -> None:
     runs = [drive(made_in) for made_in in ("python", "c")]
