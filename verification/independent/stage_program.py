@@ -65,7 +65,7 @@ def horizon(
     off = equations.internal_w(_mean_soc(vehicle), give)
     must = (net > equations.discharge_max_w) | (speed - vehicle.engine.electric_max_mps >= 1e-5)
     runs = must.copy()  # a run that the engine has to begin lasts
-    for t in np.flatnonzero(must):
+    for t in np.flatnonzero(must).tolist():
         if t == 0 or not must[t - 1]:
             runs[t : t + vehicle.engine.min_on_s] = True
     steps = cycle.steps
