@@ -23,12 +23,24 @@ def test_both_kinds_of_seconds_together_are_the_stage(car):
             p.forced * p.forced_net_w + p.free * p.net_w, stages.net_w, atol=1e-6
         )
         np.testing.assert_array_equal(p.forced + p.must, stages.must_share)
+        split += (p.forced > 0.0).sum()
+    assert split > 3  # else nothing would be tested
+
+
+@pytest.mark.parametrize("car", CARS)
+def test_seconds_that_begin_a_run_ask_for_what_the_battery_cannot_give(car, monkeypatch):
+    """The engine gives the rest at least. Those after them, in which the run lasts, may be easy."""
+    monkeypatch.setattr("qpmpc.preview.stages.whole_runs", lambda _, must: must)
+    builder.cache_clear()
+    split = 0
+    for step in STEPS:
+        p, _ = program(car, step, 0.6, 60.0, False)
         some = p.forced > 0.0
         split += some.sum()
-        # the battery cannot give what they ask for: the engine gives the rest at least
         assert (p.forced_net_w[some] > p.net_w[some]).all()
         assert (p.forced_low_w[some] > 0.0).all()
-    assert split > 3  # else nothing would be tested
+    builder.cache_clear()
+    assert split > 3
 
 
 @settings(deadline=None, max_examples=40)

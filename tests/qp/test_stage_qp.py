@@ -12,6 +12,7 @@ from qpmpc.cycles import load_cycle
 from qpmpc.preview import HorizonSettings, StageBuilder, Stages, Trace
 from qpmpc.pwa import PwaModel
 from qpmpc.qp import Linearisation, QpSettings, ScalingSettings, StageQp, Var
+from qpmpc.qp.rows import SOC_KEPT
 from qpmpc.vehicle import load_vehicle
 
 VEHICLE = load_vehicle()
@@ -194,7 +195,7 @@ def test_ends_of_blocks_keep_a_reserve_of_charge_more_where_the_thermostat_opens
     wanted = share * (trip.soc_init - battery.soc_min) - stages.refill_j / MODEL.battery_energy_j
     reserved = np.where(ends, np.maximum(wanted, 0.0), 0.0)
     swing = stages.fall_j / MODEL.battery_energy_j
-    expected = np.maximum(battery.soc_min + swing, -1.0) + reserved  # -1: none
+    expected = np.maximum(battery.soc_min + SOC_KEPT + swing, -1.0) + reserved  # -1: none
     assert planned[:-1] == pytest.approx(expected[:-1])
     assert planned[-1] == pytest.approx(trip.soc_init)
 
@@ -213,7 +214,7 @@ def test_what_the_road_beyond_refills_needs_no_reserve():
     data = qp.update(replace(steady, internal_off_w=internal_off_w), 0.6, 60.0, about)
     lower = (data.lower / data.scaling.row).reshape(qp.stages, -1)[:, qp.rows.first("box_soc")]
     swing = steady.fall_j / MODEL.battery_energy_j
-    kept = lower - VEHICLE.battery.soc_min - swing
+    kept = lower - VEHICLE.battery.soc_min - SOC_KEPT - swing
     assert kept[ends[:2]] == pytest.approx([0.0, 0.5 * unit], abs=1e-12)
 
 
@@ -228,7 +229,7 @@ def test_soc_keeps_the_swing_from_its_limits_at_the_ends_of_blocks_alone():
     )
     short = BUILDER.settings.short_stages
     battery = VEHICLE.battery
-    assert low[:short] == pytest.approx(battery.soc_min)
+    assert low[:short] == pytest.approx(battery.soc_min + SOC_KEPT)
     assert high[:short] == pytest.approx(battery.soc_max)
     ends = np.arange(short + 2, qp.stages - 1, 3)
     inside = np.setdiff1d(np.arange(short, qp.stages - 1), ends)
@@ -236,7 +237,8 @@ def test_soc_keeps_the_swing_from_its_limits_at_the_ends_of_blocks_alone():
     assert np.all(high[inside] > 1.0)
     assert np.all(low[ends] < high[ends])
     energy = MODEL.battery_energy_j
-    assert battery.soc_min + stages.fall_j[ends] / energy == pytest.approx(low[ends])
+    least = battery.soc_min + SOC_KEPT
+    assert least + stages.fall_j[ends] / energy == pytest.approx(low[ends])
     assert battery.soc_max - stages.rise_j[ends] / energy == pytest.approx(high[ends])
     assert stages.fall_j[ends].max() > 0.0 < stages.rise_j[ends].max()
 
