@@ -198,15 +198,16 @@ class RecedingHorizon(Controller):
 
     def _realised(self, plan: Plan, second: int, seen: Observation) -> Command:
         """On or off, at the power of the next second before arrival in which the plan runs."""
-        ahead = plan.on_share[second:]
+        # stages behind the arrival keep what they held before
+        last = None if plan.arrival_s is None else max(plan.arrival_s, second + 1)
+        ahead = plan.on_share[second:last]
         arrival_s = None if plan.arrival_s is None else plan.arrival_s - second
         fast_s = None if plan.fast_s is None else plan.fast_s - second
         least_w = plan.least_w if second == 0 else 0.0
         vehicle, stay_share = self.trip.vehicle, plan.stay_share
         if not engine_runs(ahead, arrival_s, seen, vehicle, least_w, fast_s, stay_share):
             return Command(False, 0.0)
-        driven = ahead if arrival_s is None else ahead[: max(arrival_s, 1)]
-        running_w = float(plan.power_on_w[second + second_of_power(driven, stay_share)])
+        running_w = float(plan.power_on_w[second + second_of_power(ahead, stay_share)])
         return Command(True, max(running_w, least_w))
 
     def _checked(self, plan: Plan, second: int) -> Plan:

@@ -28,10 +28,11 @@ def test_both_kinds_of_seconds_together_are_the_stage(car):
 
 
 @pytest.mark.parametrize("car", CARS)
-def test_seconds_that_begin_a_run_ask_for_what_the_battery_cannot_give(car, monkeypatch):
+def test_seconds_that_begin_a_run_ask_for_what_the_battery_cannot_give(car, monkeypatch, request):
     """The engine gives the rest at least. Those after them, in which the run lasts, may be easy."""
     monkeypatch.setattr("qpmpc.preview.stages.whole_runs", lambda _, must: must)
     builder.cache_clear()
+    request.addfinalizer(builder.cache_clear)
     split = 0
     for step in STEPS:
         p, _ = program(car, step, 0.6, 60.0, False)
@@ -39,7 +40,6 @@ def test_seconds_that_begin_a_run_ask_for_what_the_battery_cannot_give(car, monk
         split += some.sum()
         assert (p.forced_net_w[some] > p.net_w[some]).all()
         assert (p.forced_low_w[some] > 0.0).all()
-    builder.cache_clear()
     assert split > 3
 
 
