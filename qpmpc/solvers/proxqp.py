@@ -22,6 +22,7 @@ _STATUS = {
     "PROXQP_DUAL_INFEASIBLE": Status.INFEASIBLE,
 }
 INNER_LIMIT = 300
+INFEASIBLE = 1e-10  # by its default, 1e-4, it calls some feasible QPs infeasible
 
 
 class Proxqp(TimedSolver):
@@ -47,6 +48,7 @@ class Proxqp(TimedSolver):
         settings = self._solver.settings
         settings.compute_timings = True
         settings.eps_abs, settings.eps_rel = self.tolerance, 0.0
+        settings.eps_primal_inf = INFEASIBLE
         settings.max_iter, settings.max_iter_in = self.limit, INNER_LIMIT
         self._solver.init(**self._values(data))
 
