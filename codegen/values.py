@@ -55,7 +55,11 @@ CONSTANTS = CONSTANTS_OF_ALL | of_modules(
     (stage_qp, "LEAST_COST"),
     (polish, "LEAST_RATIO"),
     (heating_run, "IDLING_W"),
-    (last_run, "LEAST_GAIN_W WANTED_LEAST FUEL_LEAST MUST_LEAST_S"),
+    (
+        last_run,
+        "LEAST_GAIN_W WANTED_LEAST FUEL_LEAST MUST_LEAST_S"
+        " START_LEAST START_MOST START_SOON SAME_G",
+    ),
     (realise, "STAY_S STAY_SHARE"),
     (rows, "SHORTEST_SCALE_S SIGMA_FORCED COOL_SHARE SOC_KEPT MOOT_G_PER_S"),
 )

@@ -16,7 +16,8 @@ mpc_real mpc_heating_run_w(const mpc_state *state, mpc_real power_w)
     const mpc_real fuel_w = (mpc_map_cold_factor(t_cl_degc) * mpc_par.lhv_j_per_g)
                             * mpc_qp_least_fuel(state, power_w, REAL(1.0));
     const mpc_real run_s = (mpc_real)mpc_par.min_on_s;
-    const mpc_real run_j = run_s * heat_engine_w(fuel_w, power_w);
+    const mpc_real heat_w = heat_engine_w(fuel_w, power_w);
+    const mpc_real start_j = cal->start_fuel_g * mpc_par.lhv_j_per_g;
     mpc_real lasts_degc = cal->t_cl_min_degc + T_CL_MARGIN_K;
     mpc_real must_s = REAL(0.0);
     mpc_real wanted_s = REAL(0.0);
@@ -29,7 +30,9 @@ mpc_real mpc_heating_run_w(const mpc_state *state, mpc_real power_w)
         wanted_s += road->duration_s * real_max(state->stage[k].x[MPC_VAR_ON], REAL(0.0));
     }
     const mpc_real lack_j = mpc_par.heat_capacity_j_per_k * (lasts_degc - t_cl_degc);
-    const int32_t is_lacking = ((lack_j > REAL(0.0)) && (lack_j <= run_j)) ? 1 : 0;
+    const mpc_real beyond_j = lack_j - (run_s * heat_w);
+    const int32_t is_lacking =
+        ((lack_j > REAL(0.0)) && ((beyond_j * fuel_w) <= (start_j * heat_w))) ? 1 : 0;
     const int32_t is_wanted = ((wanted_s <= run_s) && (must_s <= MUST_LEAST_S)) ? is_lacking : 0;
     const int32_t is_asked =
         ((state->watch.good.engine_on != 0) && (mpc_par.polish != 0)) ? is_wanted : 0;

@@ -17,6 +17,13 @@ typedef struct {
     mpc_real internal;
 } mpc_prices;
 
+/* A second with the engine on, at its least-cost power, against the same with it off. */
+typedef struct {
+    mpc_real power_w;
+    mpc_real gain_w; /* of the battery's store */
+    mpc_real dearer; /* g/s at the plan's prices */
+} mpc_going;
+
 /* mpc_maps.c: maps of engine and battery */
 mpc_real mpc_map_fuel_g_per_s(mpc_real p_eng_w);
 mpc_real mpc_map_cold_factor(mpc_real t_cl_degc);
@@ -57,17 +64,20 @@ void mpc_qp_update(mpc_state *state);
 mpc_real mpc_qp_least_fuel(const mpc_state *state, mpc_real p_eng_w, mpc_real on);
 mpc_real mpc_qp_relaxation_gap(const mpc_state *state);
 
-/* mpc_polish.c: the first second at the plan's prices. mpc_polish_power_w: its engine power, of a plan
- * in SI units; planned_w if a charge has no price. */
+/* mpc_polish.c: a second at the plan's prices. mpc_polish_power_w: engine power of second k, of a plan
+ * in SI units; planned_w if a charge has no price. mpc_polish_going: that second with the engine on. */
 mpc_prices mpc_polish_prices(const mpc_state *state);
-mpc_real mpc_polish_power_w(const mpc_state *state, const mpc_prices *prices, mpc_real planned_w);
+mpc_real mpc_polish_power_w(const mpc_state *state, const mpc_prices *prices, int32_t k,
+                            mpc_real planned_w);
+mpc_going mpc_polish_going(const mpc_state *state, const mpc_prices *prices, int32_t k);
 
 /* Where the coming second runs beside the plan, at its least-cost power power_w (mpc_polish.c); 0
  * elsewhere. mpc_empty_battery.c: where the battery or the ramp needs the engine, with the ramp's power
- * at least. mpc_last_run.c: where a run goes on for all that the plan still wants. mpc_heating_run.c:
- * where it goes on for the heat that the coolant lacks. */
+ * at least. mpc_last_run.c: where a run goes on for all that the plan still wants, or begins for it in
+ * time. mpc_heating_run.c: where it goes on for the heat that the coolant lacks. */
 mpc_real mpc_empty_battery_w(const mpc_state *state, mpc_real power_w, mpc_real ramp_w);
-mpc_real mpc_last_run_w(const mpc_state *state, const mpc_prices *prices, mpc_real power_w);
+mpc_real mpc_last_run_w(const mpc_state *state, const mpc_prices *prices);
+mpc_real mpc_last_start_w(const mpc_state *state, const mpc_prices *prices);
 mpc_real mpc_heating_run_w(const mpc_state *state, mpc_real power_w);
 
 /* mpc_ramp.c: what the ramp asks of the coming second */

@@ -1,4 +1,4 @@
-/* The first second minimised at the plan's prices of SOC and coolant, on the battery's own curve:
+/* A second minimised at the plan's prices of SOC and coolant, on the battery's own curve:
  *
  *     min_E  w_F f(E) + w_E E + w_G l(P0 - E)
  *
@@ -26,9 +26,10 @@ mpc_prices mpc_polish_prices(const mpc_state *state)
     return prices;
 }
 
-mpc_real mpc_polish_power_w(const mpc_state *state, const mpc_prices *prices, mpc_real planned_w)
+mpc_real mpc_polish_power_w(const mpc_state *state, const mpc_prices *prices, int32_t k,
+                            mpc_real planned_w)
 {
-    const mpc_real net_w = state->stage[0].road.net_w;
+    const mpc_real net_w = state->stage[k].road.net_w;
     const int32_t is_priced = ((prices->internal > REAL(0.0)) && (mpc_par.polish != 0)) ? 1 : 0;
     const mpc_real divisor = (is_priced != 0) ? prices->internal : REAL(1.0);
     const mpc_real quarter = (mpc_par.plan_voltage_v * mpc_par.plan_voltage_v) / REAL(4.0);
@@ -47,3 +48,17 @@ mpc_real mpc_polish_power_w(const mpc_state *state, const mpc_prices *prices, mp
         real_max(real_min(mpc_par.engine_max_w, net_w + mpc_par.battery_charge_max_w), low_w);
     return (is_priced != 0) ? real_clip(best_w, low_w, high_w) : planned_w;
 }
+
+#if MPC_STARTS
+mpc_going mpc_polish_going(const mpc_state *state, const mpc_prices *prices, int32_t k)
+{
+    const mpc_stage_road *const road = &state->stage[k].road;
+    const mpc_real power_w = mpc_polish_power_w(state, prices, k, REAL(0.0));
+    const mpc_real gain_w = road->internal_off_w
+                            - mpc_map_planned_internal_w(road->net_w - power_w);
+    const mpc_real spent = (prices->fuel * mpc_qp_least_fuel(state, power_w, REAL(1.0)))
+                           + (prices->p_eng * power_w);
+    const mpc_going going = {power_w, gain_w, spent - (prices->internal * gain_w)};
+    return going;
+}
+#endif

@@ -73,18 +73,19 @@ void mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p_eng
     if (on_share[0] >= real_min(state->cal.on_threshold, STAY_SHARE)) {
         const mpc_real share = real_min(on_share[0], REAL(1.0));
         const mpc_prices prices = mpc_polish_prices(state);
-        p_eng_w[0] = share * mpc_polish_power_w(state, &prices, p_eng_w[0] / share);
+        p_eng_w[0] = share * mpc_polish_power_w(state, &prices, 0, p_eng_w[0] / share);
     }
 }
 
 mpc_real mpc_method_least_w(const mpc_state *state)
 {
     const mpc_prices prices = mpc_polish_prices(state);
-    const mpc_real power_w = mpc_polish_power_w(state, &prices, REAL(0.0));
+    const mpc_real power_w = mpc_polish_power_w(state, &prices, 0, REAL(0.0));
     const mpc_real ramp_w = mpc_ramp_least_w(state);
     mpc_real least_w = real_max(ramp_w, mpc_empty_battery_w(state, power_w, ramp_w));
 #if MPC_STARTS
-    least_w = real_max(least_w, mpc_last_run_w(state, &prices, power_w));
+    least_w = real_max(least_w, mpc_last_run_w(state, &prices));
+    least_w = real_max(least_w, mpc_last_start_w(state, &prices));
     least_w = real_max(least_w, mpc_heating_run_w(state, power_w));
 #endif
     return least_w;

@@ -39,10 +39,10 @@ def heating_run_w(
     It loses more the warmer it is: by the losses at the limit three minutes from 44 degC would seem
     to end 0.2 K warmer.
 
-    With Q the heat of the engine at the least-cost power of the coming second and b the
-    shortest run, the run goes on if one more could give that, 0 < J <= b Q, while the plan wants no
-    whole one, sum_k h_k sigma_k <= b, and no second ahead has to run anyway. Only where a start
-    costs something. To be asked while the engine runs.
+    With m and Q the fuel and the heat of the engine at the least-cost power of the coming second,
+    c those of a start and b the shortest run, the run goes on if that burns no more than one more,
+    0 < J / Q <= b + c / m, while the plan wants no whole one, sum_k h_k sigma_k <= b, and no second
+    ahead has to run anyway. Only where a start costs something. To be asked while the engine runs.
 
     Parameters
     ----------
@@ -59,9 +59,11 @@ def heating_run_w(
     if not table_of(engine).has_start or has_to_run or wanted_s > engine.min_on_s:
         return 0.0
     lack_j = thermal.heat_capacity_j_per_k * (_lasts_from_degc(thermal, stages) - t_cl_degc)
-    fuel_w = alpha_at(vehicle.cold_engine, t_cl_degc) * engine.lhv_j_per_g
-    heat_w = engine_w(thermal, fuel_w * float(fuel(power_w)), power_w)
-    return max(power_w, IDLING_W) if 0.0 < lack_j <= engine.min_on_s * heat_w else 0.0
+    fuel_w = alpha_at(vehicle.cold_engine, t_cl_degc) * engine.lhv_j_per_g * float(fuel(power_w))
+    heat_w = engine_w(thermal, fuel_w, power_w)
+    beyond_j = (lack_j - engine.min_on_s * heat_w) * fuel_w
+    is_one_run = lack_j > 0.0 and beyond_j <= engine.start_fuel_g * engine.lhv_j_per_g * heat_w
+    return max(power_w, IDLING_W) if is_one_run else 0.0
 
 
 def _lasts_from_degc(thermal: Thermal, stages: Stages) -> float:

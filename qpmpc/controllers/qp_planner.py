@@ -19,7 +19,7 @@ from qpmpc.preview.stages import Stages
 from qpmpc.pwa.learned_fuel import LearnedFuel
 from qpmpc.pwa.model import PwaModel, learned_fuel
 from qpmpc.qp.expectation import expectation
-from qpmpc.qp.last_run import last_run_w
+from qpmpc.qp.last_run import last_run_w, last_start_w
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.polish import Polish
 from qpmpc.qp.rows import Var
@@ -192,11 +192,15 @@ class QpPlanner(Planner):
             battery, maps = vehicle.battery, polish.maps
             empty_w = empty_battery_w(battery, maps, net_w, seen.soc, cheapest_w, least_w)
             least_w = max(least_w, empty_w)
+            internal_w, engine = x[:, Var.INTERNAL], vehicle.engine
             if seen.engine_on:
-                internal_w, on, t_cl_degc = x[:, Var.INTERNAL], x[:, Var.ON], seen.t_cl_degc
-                going_w = last_run_w(vehicle.engine, polish, prices, cheapest_w, stages, internal_w)
+                on, t_cl_degc = x[:, Var.ON], seen.t_cl_degc
+                going_w = last_run_w(engine, polish, prices, stages, internal_w)
                 heating_w = heating_run_w(vehicle, polish.fuel, cheapest_w, stages, on, t_cl_degc)
                 least_w = max(least_w, going_w, heating_w)
+            else:
+                starts_w = last_start_w(engine, polish, prices, stages, internal_w, short.stop)
+                least_w = max(least_w, starts_w)
         return Plan(
             on_share,
             power_w,

@@ -17,7 +17,7 @@ from qpmpc.vehicle.plant import Command, Plant
 # precision too, stays inside.
 POWER_MARGIN_W = 0.1
 SOC_MARGIN = 1e-5
-T_CL_MARGIN_K = 0.02
+T_CL_MARGIN_K = 0.004
 
 
 class Interval(NamedTuple):

@@ -35,6 +35,21 @@ class Prices(NamedTuple):
     internal: float
 
 
+class Going(NamedTuple):
+    """A second with the engine on, at its least-cost power, against the same with it off.
+
+    Attributes
+    ----------
+    power_w : E
+    gain_w : g = l(P0) - l(P0 - E), what the battery's store gains by it
+    dearer_g_per_s : d = w_F f(E) + w_E E - w_G g, what it costs more at the plan's prices
+    """
+
+    power_w: float
+    gain_w: float
+    dearer_g_per_s: float
+
+
 class Polish:
     """Least-cost engine power of a second, engine on.
 
@@ -87,3 +102,10 @@ class Polish:
         low_w = max(engine.power_min_w, net_w - vehicle.battery_discharge_max_w)
         high_w = max(min(engine.power_max_w, net_w + vehicle.battery_charge_max_w), low_w)
         return min(max(float(np.maximum(best_w, self.fuel.breakpoints[:-1]).min()), low_w), high_w)
+
+    def going(self, prices: Prices, net_w: float, off_w: float) -> Going:
+        """Return the second of net power P0 and internal power with the engine off l(P0)."""
+        power_w = self.power_w(prices, net_w, 0.0)
+        gain_w = off_w - self.internal_w(net_w - power_w)
+        spent = prices.fuel * float(self.fuel(power_w)) + prices.p_eng * power_w
+        return Going(power_w, gain_w, spent - prices.internal * gain_w)

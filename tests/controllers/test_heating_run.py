@@ -12,6 +12,8 @@ from qpmpc.pwa import PwaModel
 from qpmpc.qp.polish import Polish, Prices
 from qpmpc.trajectory import Trajectory
 from qpmpc.vehicle import Command, Plant, PlantState, load_vehicle
+from qpmpc.vehicle.engine import alpha_at
+from qpmpc.vehicle.heat import engine_w
 
 CAR = load_vehicle()
 POLISH = Polish(CAR, PwaModel.of(CAR))
@@ -63,6 +65,18 @@ def test_it_goes_on_for_less_than_a_run_and_only_for_heat_that_is_missing(left_s
     assert power_w(lasts + off_k, left_s) == 0.0
     assert power_w(lasts - off_k, left_s) == POLISH.power_w(PRICES, DRIVING_W, 0.0) > 0.0
     assert power_w(lasts - 2.0, left_s) == 0.0
+
+
+def test_it_goes_on_while_that_burns_no_more_than_another_run() -> None:
+    """Another run is one of 4 s and its start; going on is some 5.6 s of idling fuel here."""
+    lasts, engine, thermal = lasts_from_degc(), CAR.engine, CAR.thermal
+    going_w = power_w(lasts - 0.1)
+    fuel_g_per_s = alpha_at(CAR.cold_engine, lasts) * float(POLISH.fuel(going_w))
+    heat_w = engine_w(thermal, fuel_g_per_s * engine.lhv_j_per_g, going_w)
+    k_per_s = heat_w / thermal.heat_capacity_j_per_k
+    most_s = (engine.min_on_s * fuel_g_per_s + engine.start_fuel_g) / fuel_g_per_s
+    assert power_w(lasts - 0.99 * most_s * k_per_s) > 0.0
+    assert power_w(lasts - 1.01 * most_s * k_per_s) == 0.0
 
 
 def test_not_where_the_plan_has_a_run_ahead_or_starts_are_free() -> None:

@@ -1,4 +1,4 @@
-"""A run goes on where the rest of the trip wants less than one more run of the engine."""
+"""The last run of the engine: the one before goes on for it, or it begins in good driving."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from qpmpc.codegen.c_compiler import compiler
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa import PwaModel
-from qpmpc.qp.last_run import last_run_w
+from qpmpc.qp.last_run import last_run_w, last_start_w
 from qpmpc.qp.polish import Polish, Prices
 from qpmpc.trajectory import Trajectory
 from qpmpc.vehicle import load_vehicle
@@ -17,25 +17,35 @@ CAR = load_vehicle()
 POLISH = Polish(CAR, PwaModel.of(CAR))
 # a gram of fuel is worth a gram; a joule in the battery what the engine makes it for, 0.09 g/kJ
 PRICES = Prices(fuel=1.0, p_eng=0.0, internal=9e-5)
-DRIVING_W = 3e3
+DRIVING_W, FAST_W = 3e3, 14e3
+SECONDS = 20
 
 
-def stages(wanted_j: float, must_share: float = 0.0) -> tuple[Stages, np.ndarray]:
-    """A second of easy driving and a minute to arrival, in which the plan takes some energy."""
-    n = np.array([1.0, 60.0])
-    off_w = POLISH.internal_w(DRIVING_W)
-    same = np.full(2, off_w)
-    net_w = np.full(2, DRIVING_W)
-    must = np.array([0.0, must_share])
-    zero = np.zeros(2)
-    trip = Stages(n, net_w, zero + 8.0, same, must, net_w, same, zero, zero, zero)
-    return trip, same - np.array([0.0, wanted_j / 60.0])
+def stages(
+    wanted_j: float,
+    must_share: float = 0.0,
+    now_w: float = DRIVING_W,
+    then_w: float = DRIVING_W,
+    soon_share: float = 0.0,
+) -> tuple[Stages, np.ndarray]:
+    """Twenty seconds of driving and a minute to arrival, in which the plan takes some energy.
+
+    A share of it in those seconds, the rest in the minute; from the eleventh on they ask for
+    `then_w`.
+    """
+    h = np.append(np.ones(SECONDS), 60.0)
+    net_w = np.repeat([now_w, then_w, DRIVING_W], [10, SECONDS - 10, 1])
+    off_w = np.array([POLISH.internal_w(w) for w in net_w.tolist()])
+    zero = np.zeros(SECONDS + 1)
+    must = np.append(np.zeros(SECONDS), must_share)
+    trip = Stages(h, net_w, zero + 8.0, off_w, must, net_w, off_w, zero, zero, zero)
+    taken_w = np.append(np.full(SECONDS, soon_share / SECONDS), (1.0 - soon_share) / 60.0)
+    return trip, off_w - wanted_j * taken_w
 
 
 def power_w(wanted_j: float, car=CAR, prices=PRICES, must_share: float = 0.0) -> float:
     trip, internal_w = stages(wanted_j, must_share)
-    going_w = POLISH.power_w(prices, DRIVING_W, 0.0)
-    return last_run_w(car.engine, POLISH, prices, going_w, trip, internal_w)
+    return last_run_w(car.engine, POLISH, prices, trip, internal_w)
 
 
 GOING_W = POLISH.power_w(PRICES, DRIVING_W, 0.0)
@@ -82,6 +92,54 @@ def test_not_for_nothing_beside_a_full_battery() -> None:
     idle = Prices(1.0, 0.0, 1e-6)
     assert POLISH.power_w(idle, DRIVING_W, 0.0) < DRIVING_W
     assert power_w(10.0, prices=idle) == 0.0
+
+
+USUAL = Prices(fuel=1.08, p_eng=0.0, internal=6.5e-5)  # under way, heat of fuel set off
+RUN = [POLISH.going(USUAL, FAST_W, POLISH.internal_w(FAST_W))] * CAR.engine.min_on_s
+RUN_J = sum(second.gain_w for second in RUN)
+
+
+def start_w(
+    runs: float,
+    car=CAR,
+    now_w=FAST_W,
+    then_w=DRIVING_W,
+    soon_share=0.8,
+    must_share=0.0,
+    prices=USUAL,
+) -> float:
+    """So many runs are wanted, each of what a shortest one gives now."""
+    gives_j = car.engine.min_on_s * POLISH.going(prices, now_w, POLISH.internal_w(now_w)).gain_w
+    trip, internal_w = stages(runs * gives_j, must_share, now_w, then_w, soon_share)
+    return last_start_w(car.engine, POLISH, prices, trip, internal_w, SECONDS)
+
+
+@pytest.mark.parametrize(
+    ("runs", "begins"), [(0.4, False), (0.6, True), (1.0, True), (1.4, True), (1.6, False)]
+)
+def test_it_begins_where_a_shortest_run_pays_for_its_start(runs, begins) -> None:
+    assert sum(second.dearer_g_per_s for second in RUN) < -CAR.engine.start_fuel_g
+    assert start_w(runs) == (RUN[0].power_w if begins else 0.0)
+
+
+def test_it_waits_for_better_seconds() -> None:
+    """Slow driving does not pay for a start; what the plan wants later, it may get at less cost."""
+    easy = POLISH.going(USUAL, DRIVING_W, POLISH.internal_w(DRIVING_W))
+    assert 4.0 * easy.dearer_g_per_s > -CAR.engine.start_fuel_g
+    assert start_w(1.0, now_w=DRIVING_W) == 0.0
+    assert start_w(1.0, then_w=FAST_W + 4e3) == 0.0
+    assert start_w(1.0, then_w=FAST_W - 4e3) > 0.0
+    assert start_w(1.0, soon_share=0.51) > 0.0
+    assert start_w(1.0, soon_share=0.49) == 0.0
+
+
+def test_it_is_no_start_that_something_else_decides() -> None:
+    """Free starts, a second that has to run anyway, heat, an arrival nearer than a run lasts."""
+    free = CAR.with_settings({"engine.start_fuel_g": 0.0, "engine.start_energy_j": 0.0})
+    heating = USUAL._replace(fuel=0.4, internal=0.4 * USUAL.internal)
+    assert start_w(1.0, free) == start_w(1.0, must_share=0.05) == 0.0
+    assert start_w(1.0, prices=heating) == 0.0
+    assert start_w(1.0, CAR.with_settings({"engine.min_on_s": SECONDS + 1})) == 0.0
 
 
 SHORT = "random-7066-196s"

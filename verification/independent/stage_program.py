@@ -299,7 +299,7 @@ def _coolant_floor_degc(
         kept = (1.0 - th.exhaust_share) * (burnt * equations.lhv_j_per_g - shaft)
         gain[k] = h * kept / th.heat_capacity_j_per_k
         charge = min(max(charge - h * float(road.off_w[k]) / energy_j, cell.soc_min), cell.soc_max)
-    slack_k = 0.025  # at arrival, where heat is worth nothing; the safety layer asks for 0.02
+    slack_k = 0.005  # at arrival, where heat is worth nothing; the safety layer asks for 0.004
     floor = np.full(n, min(th.t_cl_min_degc + slack_k, coldest))
     rest_k = floor[-1]  # an engine that rests from here on arrives with that
     most = max(coldest, (th.t_cl_min_degc + th.t_cl_max_degc) / 2.0)
