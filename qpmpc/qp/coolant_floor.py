@@ -13,7 +13,7 @@ from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
 
-ARRIVAL_K = 0.005  # floor at arrival, above the limit: the safety layer keeps 0.02 K from it
+ARRIVAL_K = 0.005  # floor at arrival, above the limit: the safety layer keeps 0.004 K from it
 USABLE = 0.5  # of the room for charge: the engine's heat is not had all at once; docs/choice.md
 
 
