@@ -174,6 +174,35 @@ def test_c_goes_on_as_python_does() -> None:
     np.testing.assert_allclose(runs[0].p_eng_w, runs[1].p_eng_w, rtol=1e-6, atol=1e-3)
 
 
+ROAD = "judge-045"
+OF_ROAD = {
+    "thermal.t_amb_degc": 1.539283,
+    "trip.soc_init": 0.48782,
+    "trip.t_cl_init_degc": 50.289476,
+}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+def test_the_last_run_begins_while_the_car_drives(monkeypatch) -> None:
+    """Without it the last start is at standstill before arrival; in C as in Python."""
+
+    def on_road(made_in: str) -> Trajectory:
+        settings = {**OF_ROAD, "mh_qp.implementation": made_in}
+        return qpmpc.simulate(ROAD, "mh-qp", vehicle="prius-liion", settings=settings).trajectory
+
+    now, in_c = on_road("python"), on_road("c")
+    monkeypatch.setattr("qpmpc.controllers.qp_planner.last_start_w", lambda *_: 0.0)
+    before = on_road("python")
+    np.testing.assert_array_equal(now.engine_on, in_c.engine_on)
+    np.testing.assert_allclose(now.p_eng_w, in_c.p_eng_w, rtol=1e-6, atol=1e-3)
+    last = [int(np.flatnonzero(run.started)[-1]) for run in (now, before)]
+    assert now.demand_w[last[0]] > 5e3 > before.demand_w[last[1]]
+    soc_g = 171.0  # of a unit of SOC on this trip, dynamic programming's
+    fuel_g = [run.fuel_g.sum() - soc_g * run.soc[-1] for run in (now, before)]
+    assert fuel_g[1] - fuel_g[0] > 1.5 * CAR.engine.start_fuel_g
+
+
 def test_it_is_left_out_where_the_power_is_not_polished(monkeypatch) -> None:
     part = Cycle.from_samples("part", np.arange(121), load_cycle("nycc").speed_mps[60:181])
     for polish in (False, True):
