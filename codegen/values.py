@@ -18,7 +18,7 @@ from qpmpc.preview import checked, swing
 from qpmpc.pwa import learned_fuel
 from qpmpc.pwa.model import PwaModel
 from qpmpc.pwa.model import learned_fuel as learner_of
-from qpmpc.qp import coolant_floor, last_run, linearisation, polish, rows, stage_qp
+from qpmpc.qp import coolant_floor, last_run, linearisation, polish, relaxation, rows, stage_qp
 from qpmpc.qp.quantities import pieces_of
 from qpmpc.qp.rows import Rows, Table, table_of
 from qpmpc.qp.stage_qp import qp_parameters
@@ -51,10 +51,10 @@ CONSTANTS_OF_ALL = of_modules(
     (demand, "GRAVITY_MPS2 ROAD_LOAD_DEGC"),
 )
 CONSTANTS = CONSTANTS_OF_ALL | of_modules(
-    (qp_planner, "FAILURES_FORGIVEN LEAST_SIZE_W"),
+    (relaxation, "LEAST_SIZE_W"),
     (stage_qp, "LEAST_COST"),
     (polish, "LEAST_RATIO"),
-    (heating_run, "IDLING_W"),
+    (heating_run, "IDLING_W BEYOND_K"),
     (
         last_run,
         "LEAST_GAIN_W WANTED_LEAST FUEL_LEAST MUST_LEAST_S"

@@ -78,7 +78,7 @@ mpc_going mpc_polish_going(const mpc_state *state, const mpc_prices *prices, int
 mpc_real mpc_empty_battery_w(const mpc_state *state, mpc_real power_w, mpc_real ramp_w);
 mpc_real mpc_last_run_w(const mpc_state *state, const mpc_prices *prices);
 mpc_real mpc_last_start_w(const mpc_state *state, const mpc_prices *prices);
-mpc_real mpc_heating_run_w(const mpc_state *state, mpc_real power_w);
+mpc_real mpc_heating_run_w(const mpc_state *state, const mpc_prices *prices, mpc_real power_w);
 
 /* mpc_ramp.c: what the ramp asks of the coming second */
 mpc_real mpc_ramp_least_w(const mpc_state *state);

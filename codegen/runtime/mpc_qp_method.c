@@ -86,9 +86,8 @@ mpc_real mpc_method_least_w(const mpc_state *state)
 #if MPC_STARTS
     least_w = real_max(least_w, mpc_last_run_w(state, &prices));
     least_w = real_max(least_w, mpc_last_start_w(state, &prices));
-    least_w = real_max(least_w, mpc_heating_run_w(state, power_w));
 #endif
-    return least_w;
+    return real_max(least_w, mpc_heating_run_w(state, &prices, power_w));
 }
 
 void mpc_method_report(const mpc_state *state, mpc_out *out)

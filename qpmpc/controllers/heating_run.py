@@ -1,35 +1,49 @@
-"""A run of the engine that goes on, where the coolant would not last to arrival without one more.
+"""The coolant at its lower limit: a run that goes on for heat, and the second that ends it.
 
 A plan of shares rounds away a tenth of a kelvin that the coolant lacks at arrival; a minute later
-the safety layer starts the engine for it, for a shortest run.
+the safety layer starts the engine for it, for a shortest run. Nor does it see that heat comes in
+whole seconds, of which the last gives more than is missing.
 
 The same in C: codegen/runtime/mpc_heating_run.c.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.controllers.safety import T_CL_MARGIN_K
 from qpmpc.preview.stages import Stages
-from qpmpc.pwa.fit import PwaFit
 from qpmpc.qp.last_run import MUST_LEAST_S
+from qpmpc.qp.polish import Polish, Prices
 from qpmpc.qp.rows import table_of
+from qpmpc.trip import Observation
 from qpmpc.vehicle.engine import alpha_at
 from qpmpc.vehicle.heat import cooling_w, engine_w
 from qpmpc.vehicle.parameters import Thermal, Vehicle
+from qpmpc.vehicle.section import STEP_S
 
 IDLING_W = 1.0  # power that stands for idling: 0 would be no wish to run
+BEYOND_K = 1e-3  # more than is missing, in the second that ends it: rounding asks for no other
+
+
+class _Second(NamedTuple):
+    """A second of the running engine: fuel, what it costs more than a rest, and heat."""
+
+    fuel_g: float
+    dearer_g: float
+    heat_w: float
 
 
 def heating_run_w(
     vehicle: Vehicle,
-    fuel: PwaFit,
-    power_w: float,
+    polish: Polish,
+    prices: Prices,
     stages: Stages,
     on_share: NDArray[np.float64],
-    t_cl_degc: float,
+    seen: Observation,
 ) -> float:
-    """Return the power at which a run goes on for the heat that is missing; 0 if it need not.
+    """Return the power at which the engine runs for the heat that is missing; 0 if it need not.
 
     With the engine at rest the coolant lasts to arrival from T_0, backwards from the end
 
@@ -37,33 +51,70 @@ def heating_run_w(
 
     with T_n = T_cl,min + `T_CL_MARGIN_K`, which the safety layer keeps, and lacks J = C (T_0 - T).
     It loses more the warmer it is: by the losses at the limit three minutes from 44 degC would seem
-    to end 0.2 K warmer.
+    to end 0.2 K warmer. Nothing is done unless J > 0, the plan wants no whole run,
+    sum_k h_k sigma_k <= b, the shortest one or 1 s, and no second ahead has to run anyway.
 
-    With m and Q the fuel and the heat of the engine at the least-cost power of the coming second,
-    c those of a start and b the shortest run, the run goes on if that burns no more than one more,
-    0 < J / Q <= b + c / m, while the plan wants no whole one, sum_k h_k sigma_k <= b, and no second
-    ahead has to run anyway. Only where a start costs something. To be asked while the engine runs.
+    With m and Q the fuel and the heat of the coming second at its least-cost power E, and c the
+    fuel of a start, a run whose start cost something goes on at E if that burns no more than one
+    more, J / Q <= b + c / m.
+
+    Such a second, and one in which the coolant would leave its limit without the engine, ends
+    what is missing, if it can. A start gives Q_s by itself and Q in each of the other b - 1 seconds
+    of its run: left are J' = J - Q_s - (b - 1) Q + C `BEYOND_K`. Where that is more than Q and
+    less than 2 Q, the power is E' = Q^-1(J') instead, if it costs no more than two seconds at E:
+    d(E') <= 2 d(E), with d(P) = alpha f(P) - w_G (l(P0) - l(P0 - P)).
 
     Parameters
     ----------
-    vehicle : gives b, C, Q_out
-    fuel : curve of the plan
-    power_w : that power at the plan's prices, see `Polish`
+    vehicle : gives b, c, C, Q_out
+    polish, prices : of the plan
     stages : of the plan, from now on
     on_share : sigma of each stage by the plan, shape (n,)
-    t_cl_degc : coolant now
+    seen : the present
     """
-    engine, thermal = vehicle.engine, vehicle.thermal
-    wanted_s = float((stages.duration_s * np.maximum(on_share, 0.0)).sum())
-    has_to_run = stages.must_s > MUST_LEAST_S
-    if not table_of(engine).has_start or has_to_run or wanted_s > engine.min_on_s:
-        return 0.0
+    engine, thermal, t_cl_degc = vehicle.engine, vehicle.thermal, seen.t_cl_degc
+    run_s, wanted_s = max(engine.min_on_s, 1), (stages.duration_s * np.maximum(on_share, 0.0)).sum()
+    limit_degc = thermal.t_cl_min_degc + T_CL_MARGIN_K
     lack_j = thermal.heat_capacity_j_per_k * (_lasts_from_degc(thermal, stages) - t_cl_degc)
-    fuel_w = alpha_at(vehicle.cold_engine, t_cl_degc) * engine.lhv_j_per_g * float(fuel(power_w))
-    heat_w = engine_w(thermal, fuel_w, power_w)
-    beyond_j = (lack_j - engine.min_on_s * heat_w) * fuel_w
-    is_one_run = lack_j > 0.0 and beyond_j <= engine.start_fuel_g * engine.lhv_j_per_g * heat_w
-    return max(power_w, IDLING_W) if is_one_run else 0.0
+    if lack_j <= 0.0 or stages.must_s > MUST_LEAST_S or wanted_s > run_s:
+        return 0.0
+    hot_w = alpha_at(vehicle.cold_engine, t_cl_degc) * engine.lhv_j_per_g
+    net_w, off_w = float(stages.net_w[0]), float(stages.internal_off_w[0])
+
+    def second(power_w: float) -> _Second:
+        fuel_w = hot_w * float(polish.fuel(power_w))
+        fuel_g = fuel_w / engine.lhv_j_per_g
+        dearer_g = fuel_g - prices.internal * (off_w - polish.internal_w(net_w - power_w))
+        return _Second(fuel_g, dearer_g, engine_w(thermal, fuel_w, power_w))
+
+    power_w = polish.power_w(prices, net_w, 0.0)
+    one = second(power_w)
+    left_j = lack_j + BEYOND_K * thermal.heat_capacity_j_per_k
+    if seen.engine_on and table_of(engine).has_start:
+        beyond_j = lack_j - run_s * one.heat_w
+        if beyond_j * one.fuel_g > engine.start_fuel_g * one.heat_w:
+            return 0.0
+        least_w = max(power_w, IDLING_W)
+    else:
+        rested_k = STEP_S * cooling_w(thermal, t_cl_degc, float(stages.speed_mps[0]))
+        if t_cl_degc - rested_k / thermal.heat_capacity_j_per_k >= limit_degc:
+            return 0.0
+        if not seen.engine_on:
+            left_j -= engine_w(thermal, engine.start_fuel_g * engine.lhv_j_per_g, 0.0)
+            left_j -= (run_s - 1) * STEP_S * one.heat_w
+        least_w = 0.0
+    if one.heat_w < left_j / STEP_S < 2.0 * one.heat_w:
+        all_w = _power_w(vehicle, polish, hot_w, left_j / STEP_S)
+        if second(all_w).dearer_g <= 2.0 * one.dearer_g:
+            return all_w
+    return least_w
+
+
+def _power_w(vehicle: Vehicle, polish: Polish, hot_w: float, heat_w: float) -> float:
+    """Return the power that gives this heat: the least over the pieces, as fuel is the greatest."""
+    fuel, kept = polish.fuel, engine_w(vehicle.thermal, 1.0, 0.0)
+    of_pieces = (heat_w / kept - hot_w * fuel.intercept) / (hot_w * fuel.slope - 1.0)
+    return min(float(of_pieces.min()), vehicle.engine.power_max_w)
 
 
 def _lasts_from_degc(thermal: Thermal, stages: Stages) -> float:

@@ -22,6 +22,7 @@ from qpmpc.qp.expectation import expectation
 from qpmpc.qp.last_run import last_run_w, last_start_w
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.polish import Polish
+from qpmpc.qp.relaxation import relaxation_gap
 from qpmpc.qp.rows import Var
 from qpmpc.qp.stage_qp import QpData, StageQp
 from qpmpc.solvers.base import QpSolution, QpSolver, Status, consistent, failed
@@ -34,9 +35,6 @@ Floats = NDArray[np.float64]
 DEPARTURE_LINEARISATIONS = 5
 FAILURES_FORGIVEN = 10  # unusable solutions in a row after which the last usable plan is kept
 WARM_UP_STEPS = 5  # of K iterations; measured: fewer gain nothing, with more the rules drive longer
-
-
-LEAST_SIZE_W = 1000.0  # power that the relaxation gap is relative to, at least
 
 
 @dataclass(frozen=True)
@@ -194,19 +192,19 @@ class QpPlanner(Planner):
             least_w = max(least_w, empty_w)
             internal_w, engine = x[:, Var.INTERNAL], vehicle.engine
             if seen.engine_on:
-                on, t_cl_degc = x[:, Var.ON], seen.t_cl_degc
                 going_w = last_run_w(engine, polish, prices, stages, internal_w)
-                heating_w = heating_run_w(vehicle, polish.fuel, cheapest_w, stages, on, t_cl_degc)
-                least_w = max(least_w, going_w, heating_w)
+                least_w = max(least_w, going_w)
             else:
                 starts_w = last_start_w(engine, polish, prices, stages, internal_w, short.stop)
                 least_w = max(least_w, starts_w)
+            heating_w = heating_run_w(vehicle, polish, prices, stages, x[:, Var.ON], seen)
+            least_w = max(least_w, heating_w)
         return Plan(
             on_share,
             power_w,
             True,
             iterations,
-            self._relaxation_gap(solved),
+            relaxation_gap(self.trip.vehicle, self.model, solved.stages, solved.x),
             arrival_s=solved.stages.arrival_s(self.of_qp.horizon.short_stages),
             least_w=least_w,
             certificate_g=self._certificate(
@@ -295,25 +293,6 @@ class QpPlanner(Planner):
             data.scaling.dual(solution.dual).reshape(len(stages.duration_s), -1),
             solution,
         )
-
-    def _relaxation_gap(self, plan: QpPlan) -> float:
-        """Slack of the relaxed inequalities at the applied stage, relative.
-
-        (|F - F_pwa| LHV + |G - G_pwa|) / max(|F| LHV + |G|, 1 kW), where F_pwa and G_pwa are the
-        relaxed curves at (E, sigma): zero when both inequalities are tight.
-        """
-        x, net_w = plan.x[0], float(plan.stages.net_w[0])
-        p_eng, on = float(x[Var.P_ENG]), float(x[Var.ON])
-        fuel, battery = self.model.fuel, self.model.battery
-        least_fuel = float((fuel.slope * p_eng + fuel.intercept * on).max())
-        off_w = float(plan.stages.internal_off_w[0])
-        on_part = battery.slope * (on * net_w - p_eng) + battery.intercept * on
-        least_internal = float(on_part.max()) + (1.0 - on) * off_w
-        lhv_j_per_g = self.trip.vehicle.engine.lhv_j_per_g
-        slack = abs(float(x[Var.FUEL]) - least_fuel) * lhv_j_per_g
-        slack += abs(float(x[Var.INTERNAL]) - least_internal)
-        size = abs(float(x[Var.FUEL])) * lhv_j_per_g + abs(float(x[Var.INTERNAL]))
-        return slack / max(size, LEAST_SIZE_W)
 
 
 def _backend(of_qp: MhQpSettings, name: str) -> QpSolver:
