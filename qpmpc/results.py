@@ -12,7 +12,7 @@ from qpmpc.controllers.monitor import Flag
 from qpmpc.engine_runs import run_figures
 from qpmpc.limits import Excess, excess_of, sentence
 from qpmpc.qp.expectation import Expectation
-from qpmpc.shown import shown
+from qpmpc.shown import shown, two_digits
 from qpmpc.trajectory import Trajectory
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.parameters import Vehicle
@@ -25,6 +25,7 @@ COMPARABLE_SHARE = 0.03  # largest SOC correction, as a share of fuel, of a comp
 J_PER_KWH = 3.6e6
 MOSTLY = 0.5  # share of the time
 OFF_EXPECTED_PERCENT = 1.0  # from which on a run's fuel is in doubt, see docs/qp.md
+LOOSE_GAP = 0.1  # mean slack of the relaxed curves from which on a plan cannot be driven
 
 
 @dataclass
@@ -137,10 +138,17 @@ class Run:
         off = self.fuel_off_expected_percent
         if off is None or abs(off) <= OFF_EXPECTED_PERCENT:
             return ""
+        gap = _max_and_mean(self.trajectory.relaxation_gap)["mean"] or 0.0
+        why = (
+            f"its plans burn or lose {two_digits(100.0 * gap)} % more than engine and battery "
+            "would, which no car can drive: a term of its program gains by it"
+            if gap > LOOSE_GAP
+            else "the forecast was wrong or the plan a poor one, and the fuel may be far from the "
+            "optimum"
+        )
         return (
-            f"{self.controller} on {self.cycle}: fuel is {abs(off):.2g} % "
-            f"{'above' if off > 0.0 else 'below'} what the plan at departure expected: the "
-            "forecast was wrong or the plan a poor one, and the fuel may be far from the optimum"
+            f"{self.controller} on {self.cycle}: fuel is {two_digits(abs(off))} % "
+            f"{'above' if off > 0.0 else 'below'} what the plan at departure expected: {why}"
         )
 
     @cached_property

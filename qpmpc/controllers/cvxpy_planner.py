@@ -1,5 +1,6 @@
 """`mh-qp` written in cvxpy as a planner, for driving with a modified problem."""
 
+from dataclasses import replace
 from typing import Any
 
 import cvxpy
@@ -15,7 +16,9 @@ from qpmpc.errors import InputError, QpmpcError
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.cvxpy_twin import CvxpyTwin
+from qpmpc.qp.expectation import expectation
 from qpmpc.qp.linearisation import Linearisation
+from qpmpc.qp.relaxation import relaxation_gap
 from qpmpc.qp.rows import Var
 from qpmpc.trip import Observation, Trip
 
@@ -37,6 +40,7 @@ class CvxpyPlanner(Planner):
     ----------
     solver : called by cvxpy; a class attribute is enough
     program : the program, with its expressions, objective and constraints
+    model : its PWA curves
     preview : cuts the road ahead into stages; the first `preview.settings.short_stages` of them are
         the seconds ahead, the others are demand classes of blocks, not in the order of time
     """
@@ -54,11 +58,11 @@ class CvxpyPlanner(Planner):
             )
         self.solver_name = f"cvxpy {self.solver.lower()}"
         self.preview = trip.preview(of_qp.horizon)
-        model = PwaModel.of(vehicle, of_qp.pwa)
-        self.program = CvxpyTwin(vehicle, model, self.preview.count, of_qp.qp)
+        self.model = PwaModel.of(vehicle, of_qp.pwa)
+        self.program = CvxpyTwin(vehicle, self.model, self.preview.count, of_qp.qp)
         self._own = checked_terms(self.name, self.program, self.terms)
         self.program.add(*self._own)
-        self._explained = False
+        self._explained, self._departs = False, True
         self._about: Linearisation | None = None
         self._ramp = RampFloor(vehicle)
 
@@ -87,7 +91,7 @@ class CvxpyPlanner(Planner):
             if parameter.value is None:
                 raise QpmpcError(
                     f"{self.name}: the parameter {parameter.name()!r} of terms has no value: set "
-                    "it in plan, before super().plan(seen)"
+                    "it in plan, before super().plan(seen); cp.Parameter(name=..) gives it a name"
                 )
 
     def _why(self) -> str:
@@ -104,11 +108,21 @@ class CvxpyPlanner(Planner):
     def depart(self, seen: Observation) -> None:
         """Forget any earlier trip."""
         self.forget()
+        self.expects, self._departs = None, True
 
     def forget(self) -> None:
         """Forget preview and last plan, as after a restart of the ECU under way."""
         self.preview.forget()
         self._about, self._explained = None, False
+
+    def _departing(self, seen: Observation, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Solve once more about the coolant of the first plan, and keep what that expects."""
+        layout = self.preview.settings
+        self._about = Linearisation.about(x, seen.t_cl_degc, layout)
+        stages = self.set_program(seen)
+        x = self.solved()
+        self.expects = expectation(self.trip, layout, self.model, stages, x)
+        return x
 
     def plan(self, seen: Observation) -> Plan:
         """Solve the program of this second; without a solution there is no plan."""
@@ -116,6 +130,8 @@ class CvxpyPlanner(Planner):
         self._require_values()
         try:
             x = self.solved()
+            if self._departs:
+                x, self._departs = self._departing(seen, x), False
             if self.solver_fails:
                 raise QpmpcError("failure injected")
         except QpmpcError as error:
@@ -129,4 +145,6 @@ class CvxpyPlanner(Planner):
         least_w = self._ramp.least_w(stages.seconds_w(layout.short_stages), seen.soc)
         fast_s = stages.fast_s(layout.short_stages, self.trip.vehicle)
         on_share, p_eng_w = x[short, Var.ON], x[short, Var.P_ENG]
-        return Plan.of_means(on_share, p_eng_w, arrival_s, least_w, fast_s, STAY_SHARE)
+        plan = Plan.of_means(on_share, p_eng_w, arrival_s, least_w, fast_s, STAY_SHARE)
+        gap = relaxation_gap(self.trip.vehicle, self.model, stages, x)
+        return replace(plan, relaxation_gap=gap)

@@ -10,6 +10,7 @@ from qpmpc.qp.cvxpy_twin import CvxpyTwin
 
 cp: Any = cvxpy  # its type hints leave out half of its functions
 
+UNKNOWN: str = cp.settings.UNKNOWN  # of a sign, of a curvature
 SHOWN = 100  # characters of an expression in a message
 
 
@@ -78,11 +79,22 @@ def _checked_cost(name: str, cost: Any) -> Any:
     if not grams.is_convex():
         raise QpmpcError(
             f"{name}: terms: the cost is not convex by cvxpy's rules but "
-            f"{grams.curvature.lower()}: {_short(cost)}"
+            f"{grams.curvature.lower()}: {_short(cost)}{_why_unknown(grams)}"
         )
     if not grams.is_dpp():
         raise QpmpcError(f"{name}: terms: the cost {NOT_DPP}: {_short(cost)}")
     return grams
+
+
+def _why_unknown(grams: Any) -> str:
+    """Return the usual reason for a curvature that cvxpy cannot tell: a weight of unknown sign."""
+    signless = sorted({each.name() for each in grams.parameters() if each.sign == UNKNOWN})
+    if not signless or grams.curvature != UNKNOWN:
+        return ""
+    return (
+        f"; the sign of {', '.join(signless)} is not known: a weight of a convex function needs "
+        "cp.Parameter(nonneg=True)"
+    )
 
 
 def _short(what: Any) -> str:

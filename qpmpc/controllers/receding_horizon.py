@@ -170,6 +170,7 @@ class RecedingHorizon(Controller):
         """Run one step: the plan, else the shifted last plan, else the rules."""
         ruled = self._rules.step(seen)
         plan = self._plan(seen)
+        self.expects = self.planner.expects  # one that plans nothing at departure: of its first
         flags = plan.flags
         preview = getattr(self.planner, "preview", None)
         if isinstance(preview, CheckedPreview) and preview.was_bad:

@@ -40,6 +40,8 @@ UNIT = {
 
 
 METHODS = ("given", "state")  # that a user calls in `terms`
+# Known of a stage and never negative, so that a convex function may be weighed by it.
+NONNEGATIVE = {"duration_s", "speed_mps", "must_share"}
 
 
 class State(NamedTuple):
@@ -129,7 +131,8 @@ class CvxpyTwin:
         """Return what the program knows of each stage, shape (n,), by a name of its table.
 
         Such as `duration_s`, `net_w`, `speed_mps`: fields of `Stages`, `QUANTITIES` of
-        `qpmpc.qp.rows`, numbers of `qp_parameters`. What changes is a parameter, set each second.
+        `qpmpc.qp.rows`, numbers of `qp_parameters`. What changes is a parameter, set each second;
+        cvxpy knows that durations, speeds and shares are not negative.
 
         Raises
         ------
@@ -169,7 +172,8 @@ class CvxpyTwin:
         code = code_of(formula)
         if self._quantities.is_changing(formula):
             # its name is also that of a function in generated C
-            parameter = cp.Parameter(self.stages, name=name or f"given_{len(self._parameters)}")
+            own = name or f"given_{len(self._parameters)}"
+            parameter = cp.Parameter(self.stages, name=own, nonneg=name in NONNEGATIVE)
             self._parameters.append((parameter, code, piece))
             return parameter
         return self._of_piece(code, piece)

@@ -10,6 +10,7 @@ import pytest
 
 import qpmpc
 from qpmpc import CvxpyPlanner, Cycle, InputError, QpmpcError, Trip, load_cycle, load_vehicle
+from qpmpc.results import LOOSE_GAP
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # mh-qp is within 0.2 % of the optimum on this cycle, so no term can save more than about that
@@ -65,7 +66,7 @@ def planner(terms: Any) -> type[CvxpyPlanner]:
     return type("Mine", (CvxpyPlanner,), {"name": "mine", "terms": terms})
 
 
-P = cp.Parameter(name="mine", nonneg=True)
+P, WEIGHT = cp.Parameter(name="mine", nonneg=True), cp.Parameter(name="weight")
 WRONG = {
     "not convex": (lambda s, p: (-cp.sum_squares(p.on), []), "cost is not convex .* concave"),
     "per stage": (lambda s, p: (p.on, []), r"shape \(62,\), and must be one number .* cp.sum"),
@@ -76,6 +77,7 @@ WRONG = {
     "shape": (lambda s, p: (cp.sum(p.on + np.ones(20)), []), r"shape \(62,\), one entry per stage"),
     "name": (lambda s, p: (cp.sum(p.p_engine_w), []), "did you mean 'p_eng_w'"),
     "not DPP": (lambda s, p: (P * cp.sum(p.given("duration_s")) + P * P, []), "DPP"),
+    "sign": (lambda s, p: (WEIGHT * cp.square(p.soc[-1]), []), "sign of weight .*nonneg=True"),
     "text": (lambda s, p: ("much", []), "the cost is much, not an"),
 }
 
@@ -135,3 +137,29 @@ def test_own_figures_are_in_table_json_and_report(tmp_path: Path) -> None:
     assert runs.rows()[0]["figures"]["peak_kW"] == runs[0].trajectory.p_eng_w.max() / 1e3
     assert "peak kW" in str(runs)
     assert "peak kW" in runs.to_html(tmp_path / "report.html").read_text("utf-8")
+
+
+def test_a_term_may_be_weighed_by_durations() -> None:
+    """They are not negative, and cvxpy knows it: a square weighed by them is convex."""
+
+    def terms(self: Any, program: Any) -> Any:
+        ends_kw2 = cp.square(program.internal_w / 1e3)
+        return 5e-4 * cp.sum(cp.multiply(program.given("duration_s"), ends_kw2)), []
+
+    trip = short()
+    assert planner(terms)(trip).plan(trip.start).usable
+
+
+def test_a_plan_that_cannot_be_driven_is_found_out() -> None:
+    """A price on charging, of three times what a charge is worth: losses make away with it."""
+
+    def terms(self: Any, program: Any) -> Any:
+        charging_kw = cp.pos(-program.internal_w / 1e3)
+        return 0.2 * cp.sum(cp.multiply(program.given("duration_s"), charging_kw)), []
+
+    sound, loose = (qpmpc.simulate(short(60), each) for each in (CvxpyPlanner, planner(terms)))
+    gaps = [run.summary()["relaxation_gap"]["mean"] for run in (sound, loose)]
+    assert gaps[0] < LOOSE_GAP < gaps[1]
+    assert "no car can drive" in loose.doubt
+    assert "no car can drive" not in sound.doubt
+    assert sound.fuel_expected_g is not None
