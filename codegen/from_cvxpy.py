@@ -37,6 +37,7 @@ from qpmpc.trip import Trip
 EXTRA = "pip install 'qpmpc-iptm[prototype]'"
 SOLVER = "QOCO"  # C without dependencies; OSQP does not converge on this program from cold
 SOLVED = (1, 2)  # QOCO's codes: solved, solved inaccurately, as cvxpy's two of an optimum
+UNSOLVED = {3: "a numerical error", 4: "its iteration limit"}  # the others
 FOLDERS = ("include", "solver_code", *(f"solver_code/{sub}" for sub in
            ("include", "algebra", "lib/amd", "lib/qdldl/include")))  # fmt: skip
 FLAGS = ["-O2", "-std=gnu99", "-w", "-fPIC", *(f"-I{folder}" for folder in FOLDERS)]
@@ -190,7 +191,8 @@ class CompiledProgram:
             ctypes.byref(self._iterations),
         )
         if status not in SOLVED:
-            raise CodegenError(f"generated program: {SOLVER} ends with status {status}")
+            why = UNSOLVED.get(status, f"status {status}")
+            raise CodegenError(f"generated program: {SOLVER} ends with {why}")
         x: NDArray[np.float64] = self._plan.T * self._unit
         return x
 

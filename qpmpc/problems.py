@@ -22,6 +22,8 @@ _WORDS = {
     "string_too_long": "must have at most {max_length} characters",
 }
 
+_NUMBERS = {"float_type", "int_type"}
+
 
 def problems_line(
     error: ValidationError, model: type[BaseModel], owner: str, origins: Mapping[str, str]
@@ -84,6 +86,8 @@ def _wrong(each: ErrorDetails, key: str, owner: str, origins: Mapping[str, str])
     if isinstance(given, str | float | int):
         allowed = re.findall(r"'([^']*)'", each.get("ctx", {}).get("expected", ""))
         near = nearest(given, allowed) if isinstance(given, str) else ""
+        if each["type"] in _NUMBERS and isinstance(given, str):
+            text = "must be a number, without quotes"
         text += f" (given: {shown_value(given)}{f', did you mean {near!r}?' if near else ''})"
     # A check of several keys together names them in its message: each may be in another file.
     prefix = f"{key}." if key else ""

@@ -9,11 +9,13 @@ from collections.abc import Callable, Mapping, Sequence
 
 from qpmpc.controllers.base import Controller
 from qpmpc.controllers.receding_horizon import Planner, RecedingHorizon
-from qpmpc.controllers.settings import ControllerSettings
+from qpmpc.controllers.settings import ControllerSettings, refuse_old_name
 from qpmpc.cycles.load import CYCLES
 from qpmpc.errors import InputError
 from qpmpc.names import Names, Shipped, hint, unknown
+from qpmpc.nearest import nearest
 from qpmpc.problems import shown_value
+from qpmpc.settings import hint_in
 from qpmpc.solvers.names import SOLVERS
 from qpmpc.trip import Trip
 from qpmpc.vehicle.belief import is_of_model
@@ -210,6 +212,13 @@ def split_settings(
     """
     of_vehicle = {key: value for key, value in settings.items() if _is_of_trip(key)}
     of_controllers = {key: value for key, value in settings.items() if key not in of_vehicle}
+    for key in of_controllers:
+        refuse_old_name(key, of_controllers[key])
+        if "." not in key:
+            raise InputError(
+                f"no parameter {shown_value(key)}{hint_in(key, _SETTABLE)} names start with a "
+                "section and a dot, such as thermal.t_amb_degc or mh_qp.admm.iterations"
+            )
     chosen = ControllerSettings().with_settings(of_controllers)
     check_sections(chosen, controllers)
     return of_vehicle, chosen
@@ -248,8 +257,9 @@ def check_sections(
                 - _SCALARS
             )
             key = ".".join([section, *list(values)[:1]])
+            meant = hint(section, known) if nearest(section, known) else hint_in(key, _SETTABLE)
             raise InputError(
-                f"no parameter {shown_value(key)}{hint(section, known)} names start with "
+                f"no parameter {shown_value(key)}{meant} names start with "
                 f"one of {', '.join(known)} and a dot"
             )
         if model is None:
@@ -299,6 +309,7 @@ _READS = {
     **dict.fromkeys(PLANTS.shipped, ()),
 }
 _SCALARS = {"name", "description", "base"}
+_SETTABLE = (Vehicle, ControllerSettings)
 
 
 def _section(name: str) -> str:

@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, TypeVar
 
@@ -11,6 +11,7 @@ from pydantic import BaseModel, ValidationError
 
 from qpmpc.errors import InputError
 from qpmpc.names import hint
+from qpmpc.nearest import nearest
 from qpmpc.problems import problems_line, shown_value
 
 DEPTH_MAX = 32
@@ -136,6 +137,27 @@ def apply_settings(data: dict[str, Any], settings: dict[str, object], owner: str
         # numpy's numbers and arrays become Python's, which strict models require
         place[last] = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
     return result
+
+
+def dotted_names(model: type[BaseModel]) -> list[str]:
+    """Return the dotted names of all parameters of a model and of the models in it."""
+    found = []
+    for name, field in model.model_fields.items():
+        inner = field.annotation
+        if isinstance(inner, type) and issubclass(inner, BaseModel):
+            found += [f"{name}.{each}" for each in dotted_names(inner)]
+        else:
+            found.append(name)
+    return found
+
+
+def hint_in(key: str, models: Iterable[type[BaseModel]]) -> str:
+    """Return ``, did you mean 'thermal.t_amb_degc'?`` for a key of another section, or of none."""
+    last = key.rpartition(".")[2]
+    known = [name for model in models for name in dotted_names(model) if "." in name]
+    ends = {name.rpartition(".")[2]: name for name in reversed(known)}  # the first of a name wins
+    near = nearest(last, ends)
+    return f", did you mean {ends[near]!r}?" if near else ":"
 
 
 def _copy(data: dict[str, Any]) -> dict[str, Any]:

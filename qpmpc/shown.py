@@ -3,6 +3,11 @@
 from unicodedata import category
 
 
+def two_digits(value: float) -> str:
+    """Return a number of which two digits matter: 670, 0.042."""
+    return f"{float(f'{value:.2g}'):g}"
+
+
 def shown(text: str) -> str:
     r"""Return a text on one line and without effect on a terminal or a page.
 

@@ -78,7 +78,8 @@ def board_lines(data: dict[str, Any]) -> list[str]:
         f"machine's to the bit ({commands['engine_on_equal_to_the_bit']} of "
         f"{commands['engine_on_seconds']} with the engine on), the others to "
         f"{commands['largest_difference_w']:.3g} W at most where both run it; "
-        f"{len(differ)} differ by more than {commands['tolerance_w']:.3g} W or in on and off{at}",
+        f"{len(differ)} differ by more than rounding explains, "
+        f"{commands['tolerance_w']:,.0f} W, or in on and off{at}",
         f"clock                {clock}",
     ]
     if departure["slices"]:

@@ -65,7 +65,7 @@ def scale_of(
         return named, f", in {unit}" if unit else ""
     if stated:
         return quantity.units[stated], f", in {stated} as stated"
-    example = f"{name} [{next(iter(quantity.units))}]"
+    example = f"{column.title} [{next(iter(quantity.units))}]"
     raise InputError(
         f"{path}: {shown_value(column.title)} names no unit: add one of {known}, as in "
         f"{shown_value(example)}, or state it with qpmpc convert {quantity.option}"

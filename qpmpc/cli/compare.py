@@ -51,7 +51,9 @@ def compare(
     from qpmpc.cli.console import progress_bar, result_console, write_json
     from qpmpc.cli.inputs import check_outputs
     from qpmpc.comparison import compare as run
-    from qpmpc.registry import PLANTS, check_controllers
+    from qpmpc.errors import InputError
+    from qpmpc.problems import shown_value
+    from qpmpc.registry import PLANTS, check_controllers, controller_names
     from qpmpc.report.columns import COMPARE_COLUMNS
     from qpmpc.report.table import print_rows
     from qpmpc.settings import parse_settings
@@ -59,6 +61,12 @@ def compare(
     names = [name.strip() for name in controllers.split(",")]
     if plant is not None:
         PLANTS.check(plant)
+    for cycle in cycles:
+        if cycle in controller_names():
+            raise InputError(
+                f"{shown_value(cycle)} is no cycle but a controller: write --controllers "
+                "rule-based,mh-qp without a space"
+            )
     check_controllers(names, own=plant or "")
     settings = parse_settings(set_ or [])
     check_outputs(json_file, out)

@@ -4,6 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from qpmpc.shown import two_digits
+
 Row = dict[str, Any]
 
 NOT_COMPARABLE = "*"
@@ -58,7 +60,7 @@ def violations_text(row: Row) -> str:
     parts = [
         (found["soc"], f"SOC {found['soc']:.2g}"),
         (found["t_cl_degc"], f"T_cl {found['t_cl_degc']:.2g} K"),
-        (found["power_w"], f"{found['power_w']:.2g} W"),
+        (found["power_w"], f"{two_digits(found['power_w'])} W"),
     ]
     return ", ".join(text for excess, text in parts if excess > 0.0) or "none"
 

@@ -95,7 +95,9 @@ def _remarks(rows: Sequence[Row], settings: ControllerSettings) -> list[str]:
         "no forecast error.",
         "Step times are wall times of one decision in this Python process, all runs one after the "
         "other. A QP controller that is prepared (its setting below) solves its first QP before "
-        "the trip starts: that time is not among them. "
+        "the trip starts: that time is not among them. The work of a step of ours is the same each "
+        "time; that the longest takes a multiple of the median is the operating system, which "
+        "counted instructions leave out (docs/timing.md). "
         + (f"Solved: {solved_by}." if solved_by else ""),
     ]
     if REFERENCE in present:

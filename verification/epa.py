@@ -1,6 +1,6 @@
 """Sanity of the plant: the rules on EPA's cycles beside EPA's dynamometer figures.
 
-Run it with ``python -m qpmpc.verification.checks.epa``. EPA's figures are unadjusted miles per
+Run it with ``python -m qpmpc.verification.epa``. EPA's figures are unadjusted miles per
 gallon from its test-car list for the 2016 Prius; the plant was fitted to them with few free
 numbers, so this shows that the structure is consistent; it is not an independent validation. Two
 fits: with an engine that starts at no cost, `paper-nimh`, and with starts and all that makes a
