@@ -135,9 +135,14 @@ def _one(image: Image, kind: str, chosen: str | None, usual: str = "") -> str:
         if chosen not in found:
             raise InputError(f"{image.file}: no {kind} {chosen}; there is {_listed(found)}")
         return chosen
+    if not found:
+        raise InputError(
+            f"{image.file}: no variable of type {kind}: is it the linked program of a generated "
+            "controller, compiled with -g?"
+        )
     if len(found) != 1:
-        advice = ": choose one with --instance" if found else ""
-        raise InputError(f"{image.file}: {len(found) or 'no'} {kind}, {_listed(found)}{advice}")
+        listed = _listed(found)
+        raise InputError(f"{image.file}: {len(found)} {kind}, {listed}: choose one with --instance")
     return found[0]
 
 
@@ -161,7 +166,13 @@ def _characteristics(image: Image, instance: str, model: str, names: list[str]) 
         unit, what = DESCRIBED[name]
         path, factor = f"{instance}.calibration.{name}", UNITS[unit].factor
         yield _item(
-            image, path, path, what=what, conversion=unit, least=low * factor, most=high * factor
+            image,
+            path,
+            path,
+            what=what,
+            conversion=unit,
+            least=shown(low * factor),
+            most=shown(high * factor),
         )
 
 
@@ -198,8 +209,8 @@ def _measured(image: Image, at: str, model: str, table: list[Measured]) -> Itera
             name,
             what=each.what,
             conversion=conversion,
-            least=limit(each.least) * factor,
-            most=limit(each.most) * factor,
+            least=shown(limit(each.least) * factor),
+            most=shown(limit(each.most) * factor),
             mask=each.mask,
         )
 
@@ -215,6 +226,11 @@ def _wrong_entry(image: Image, at: str) -> Item:
         least=-1.0,
         most=float(len(DESCRIBED)),
     )
+
+
+def shown(limit: float) -> float:
+    """Return a limit to the seven digits of single precision: 4 %, not 3.99999991 %."""
+    return float(f"{limit:.7g}")
 
 
 def number(value: float) -> str:

@@ -70,8 +70,8 @@ def test_the_file_read_back_has_the_addresses_and_bounds_of_the_code(a2l, elf) -
         assert each.Address.Value == start + 4 * place
         factor = factors[each.Conversion.Value]
         assert factor == UNITS[entry.unit].factor
-        assert each.LowerLimit.Value == pytest.approx(entry.least * factor, rel=1e-6)
-        assert each.UpperLimit.Value == pytest.approx(entry.most * factor, rel=1e-6)
+        assert each.LowerLimit.Value == float(f"{entry.least * factor:.7g}")
+        assert each.UpperLimit.Value == float(f"{entry.most * factor:.7g}")
         assert (each.Deposit.Value, each.LongIdentifier.Value) == (
             "value_float32_ieee",
             entry.what,
