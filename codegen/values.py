@@ -54,7 +54,7 @@ CONSTANTS = CONSTANTS_OF_ALL | of_modules(
     (relaxation, "LEAST_SIZE_W"),
     (stage_qp, "LEAST_COST"),
     (polish, "LEAST_RATIO"),
-    (heating_run, "IDLING_W BEYOND_K"),
+    (heating_run, "IDLING_W BEYOND_K LEAST_GROWTH"),
     (
         last_run,
         "LEAST_GAIN_W WANTED_LEAST FUEL_LEAST MUST_LEAST_S"

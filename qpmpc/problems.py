@@ -1,5 +1,6 @@
 """All errors in a set of parameters, in one line of bounded length."""
 
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -86,8 +87,8 @@ def _wrong(each: ErrorDetails, key: str, owner: str, origins: Mapping[str, str])
     if isinstance(given, str | float | int):
         allowed = re.findall(r"'([^']*)'", each.get("ctx", {}).get("expected", ""))
         near = nearest(given, allowed) if isinstance(given, str) else ""
-        if each["type"] in _NUMBERS and isinstance(given, str):
-            text = "must be a number, without quotes"
+        if each["type"] in _NUMBERS and isinstance(given, str) and _is_number(given):
+            text += " without quotes"
         text += f" (given: {shown_value(given)}{f', did you mean {near!r}?' if near else ''})"
     # A check of several keys together names them in its message: each may be in another file.
     prefix = f"{key}." if key else ""
@@ -96,6 +97,13 @@ def _wrong(each: ErrorDetails, key: str, owner: str, origins: Mapping[str, str])
     if elsewhere:
         text += f" ({', '.join(elsewhere)})"
     return f"{key}{_origin(key, owner, origins)}: {text}" if key else text
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
 
 
 def _has_wrong_entries(loc: tuple[int | str, ...], places: list[tuple[int | str, ...]]) -> bool:

@@ -214,6 +214,8 @@ def split_settings(
     of_controllers = {key: value for key, value in settings.items() if key not in of_vehicle}
     for key in of_controllers:
         refuse_old_name(key, of_controllers[key])
+        if key in {*ControllerSettings.sections(), *Vehicle.model_fields} - _SCALARS:
+            raise InputError(f"{key!r} is a section: set its parameters one by one, {key}.NAME")
         if "." not in key:
             raise InputError(
                 f"no parameter {shown_value(key)}{hint_in(key, _SETTABLE)} names start with a "

@@ -140,8 +140,8 @@ class Run:
             return ""
         gap = _max_and_mean(self.trajectory.relaxation_gap)["mean"] or 0.0
         why = (
-            f"its plans burn or lose {two_digits(100.0 * gap)} % more than engine and battery "
-            "would, which no car can drive: a term of its program gains by it"
+            f"its plans are {two_digits(100.0 * gap)} % off the curves of fuel and losses, by a "
+            "term that gains by losses or by too few iterations, and no car can drive them"
             if gap > LOOSE_GAP
             else "the forecast was wrong or the plan a poor one, and the fuel may be far from the "
             "optimum"

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from qpmpc.errors import InputError
 from qpmpc.names import hint
 from qpmpc.nearest import nearest
-from qpmpc.problems import problems_line, shown_value
+from qpmpc.problems import leaf_keys, problems_line, shown_value
 
 DEPTH_MAX = 32
 """Tables in tables, and parts of a key: a vehicle has two. The parser takes quadratic time."""
@@ -139,24 +139,12 @@ def apply_settings(data: dict[str, Any], settings: dict[str, object], owner: str
     return result
 
 
-def dotted_names(model: type[BaseModel]) -> list[str]:
-    """Return the dotted names of all parameters of a model and of the models in it."""
-    found = []
-    for name, field in model.model_fields.items():
-        inner = field.annotation
-        if isinstance(inner, type) and issubclass(inner, BaseModel):
-            found += [f"{name}.{each}" for each in dotted_names(inner)]
-        else:
-            found.append(name)
-    return found
-
-
 def hint_in(key: str, models: Iterable[type[BaseModel]]) -> str:
     """Return ``, did you mean 'thermal.t_amb_degc'?`` for a key of another section, or of none."""
     last = key.rpartition(".")[2]
-    known = [name for model in models for name in dotted_names(model) if "." in name]
+    known = [name for model in models for name in leaf_keys(model) if "." in name]
     ends = {name.rpartition(".")[2]: name for name in reversed(known)}  # the first of a name wins
-    near = nearest(last, ends)
+    near = nearest(last, ends, cutoff=0.8)
     return f", did you mean {ends[near]!r}?" if near else ":"
 
 

@@ -95,6 +95,7 @@ def test_settings_are_split() -> None:
         ("mh_nlp.x", 1, "no settings of its own"),
         ("name", "x", "names start with a section"),
         ("others.x", 1, "names start with one of"),
+        ("thermal", -7, "'thermal' is a section"),
         ("t_amb", -7, "did you mean 'thermal.t_amb_degc'"),
         ("heat.t_amb_degc", -7, "did you mean 'thermal.t_amb_degc'"),
         ("iterations", 25, "did you mean 'mh_qp.admm.iterations'"),

@@ -31,14 +31,17 @@ static heating_second second_at(const mpc_state *state, mpc_real hot_w, mpc_real
     return second;
 }
 
-/* Power that gives this heat: the least over the pieces of the fuel curve. */
+/* Power that gives this heat: the least over the pieces of the fuel curve on which heat grows with
+ * power. */
 static mpc_real power_of(const mpc_state *state, mpc_real hot_w, mpc_real heat_w)
 {
     const mpc_real inside_w = heat_w / heat_engine_w(REAL(1.0), REAL(0.0));
-    mpc_real power_w = mpc_par.engine_max_w;
+    mpc_real power_w = REAL(2.0) * mpc_par.engine_max_w; /* more than can be had */
     for (int32_t i = 0; i < MPC_FUEL_PIECES; i++) {
         const mpc_real above_w = inside_w - (hot_w * FUEL_INTERCEPT(i));
-        power_w = real_min(power_w, above_w / ((hot_w * FUEL_SLOPE(i)) - REAL(1.0)));
+        const mpc_real growth = (hot_w * FUEL_SLOPE(i)) - REAL(1.0);
+        const mpc_real of_piece_w = above_w / real_max(growth, LEAST_GROWTH);
+        power_w = (growth > LEAST_GROWTH) ? real_min(power_w, of_piece_w) : power_w;
     }
     return power_w;
 }
@@ -83,8 +86,13 @@ mpc_real mpc_heating_run_w(const mpc_state *state, const mpc_prices *prices, mpc
     const mpc_real left_w = (engine_on != 0) ? ends_j : (ends_j - others_j);
     const mpc_real all_w = power_of(state, hot_w, left_w);
     const mpc_real all_dearer_g = second_at(state, hot_w, prices->internal, all_w).dearer_g;
+    const mpc_real before_w = (engine_on != 0) ? state->watch.good.p_eng_before_w : REAL(0.0);
+    const mpc_real ramped_w = (before_w + cal->ramp_w_per_s) - POWER_MARGIN_W;
+    const mpc_real charged_w = state->stage[0].road.net_w + mpc_par.battery_charge_max_w;
+    const mpc_real most_w = real_min(real_min(mpc_par.engine_max_w, ramped_w), charged_w);
     const int32_t is_last = ((left_w > one.heat_w) && (left_w < (REAL(2.0) * one.heat_w))) ? 1 : 0;
-    const int32_t ends = (all_dearer_g <= (REAL(2.0) * one.dearer_g)) ? is_last : 0;
+    const int32_t pays_all = (all_dearer_g <= (REAL(2.0) * one.dearer_g)) ? is_last : 0;
+    const int32_t ends = (all_w <= most_w) ? pays_all : 0;
     const mpc_real least_w = (goes_on != 0) ? real_max(power_w, IDLING_W) : REAL(0.0);
     const mpc_real wanted_w = (ends != 0) ? all_w : least_w;
     return ((is_asked != 0) && (runs != 0)) ? wanted_w : REAL(0.0);

@@ -74,7 +74,8 @@ mpc_going mpc_polish_going(const mpc_state *state, const mpc_prices *prices, int
 /* Where the coming second runs beside the plan, at its least-cost power power_w (mpc_polish.c); 0
  * elsewhere. mpc_empty_battery.c: where the battery or the ramp needs the engine, with the ramp's power
  * at least. mpc_last_run.c: where a run goes on for all that the plan still wants, or begins for it in
- * time. mpc_heating_run.c: where it goes on for the heat that the coolant lacks. */
+ * time. mpc_heating_run.c: where it goes on for the heat that the coolant lacks, or one second
+ * gives all of it. */
 mpc_real mpc_empty_battery_w(const mpc_state *state, mpc_real power_w, mpc_real ramp_w);
 mpc_real mpc_last_run_w(const mpc_state *state, const mpc_prices *prices);
 mpc_real mpc_last_start_w(const mpc_state *state, const mpc_prices *prices);

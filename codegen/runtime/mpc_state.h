@@ -126,7 +126,7 @@ typedef struct {
 #endif
     mpc_real old_on_share[MPC_SHORT]; /* last usable plan */
     mpc_real old_p_eng_w[MPC_SHORT];
-    mpc_real old_least_w;  /* of its first second, for ramp, battery or a run that goes on */
+    mpc_real old_least_w;  /* of its first second, for ramp, battery, heat or a run that goes on */
     int32_t old_age;       /* steps since then; MPC_NO_PLAN if there is none */
     int32_t old_arrival_s; /* seconds of it before arrival; MPC_SHORT if that is beyond */
     int32_t old_fast_s;    /* seconds of it before one too fast for an engine that is off;

@@ -64,8 +64,8 @@ def compare(
     for cycle in cycles:
         if cycle in controller_names():
             raise InputError(
-                f"{shown_value(cycle)} is no cycle but a controller: write --controllers "
-                "rule-based,mh-qp without a space"
+                f"{shown_value(cycle)} is no cycle but a controller: choose it with --controllers "
+                f"rule-based,{cycle}, no space after the comma"
             )
     check_controllers(names, own=plant or "")
     settings = parse_settings(set_ or [])

@@ -115,23 +115,27 @@ class CvxpyPlanner(Planner):
         self.preview.forget()
         self._about, self._explained = None, False
 
-    def _departing(self, seen: Observation, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _departing(self, seen: Observation, first: NDArray[np.float64]) -> NDArray[np.float64]:
         """Solve once more about the coolant of the first plan, and keep what that expects."""
         layout = self.preview.settings
-        self._about = Linearisation.about(x, seen.t_cl_degc, layout)
+        self._about = Linearisation.about(first, seen.t_cl_degc, layout)
         stages = self.set_program(seen)
-        x = self.solved()
+        try:
+            x = self.solved()
+        except QpmpcError:  # then by the first plan, and nothing is expected
+            return first
         self.expects = expectation(self.trip, layout, self.model, stages, x)
         return x
 
     def plan(self, seen: Observation) -> Plan:
         """Solve the program of this second; without a solution there is no plan."""
+        departs, self._departs = self._departs and seen.step == self.trip.start.step, False
         stages = self.set_program(seen)
         self._require_values()
         try:
             x = self.solved()
-            if self._departs:
-                x, self._departs = self._departing(seen, x), False
+            if departs:
+                x = self._departing(seen, x)
             if self.solver_fails:
                 raise QpmpcError("failure injected")
         except QpmpcError as error:

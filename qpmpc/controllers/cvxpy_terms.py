@@ -7,6 +7,7 @@ import cvxpy
 
 from qpmpc.errors import QpmpcError
 from qpmpc.qp.cvxpy_twin import CvxpyTwin
+from qpmpc.qp.quantities import STAGE
 
 cp: Any = cvxpy  # its type hints leave out half of its functions
 
@@ -86,15 +87,20 @@ def _checked_cost(name: str, cost: Any) -> Any:
     return grams
 
 
-def _why_unknown(grams: Any) -> str:
-    """Return the usual reason for a curvature that cvxpy cannot tell: a weight of unknown sign."""
-    signless = sorted({each.name() for each in grams.parameters() if each.sign == UNKNOWN})
-    if not signless or grams.curvature != UNKNOWN:
+def _why_unknown(expression: Any) -> str:
+    """Return a usual reason for a curvature that cvxpy cannot tell: a weight of unknown sign."""
+    signless = {each.name() for each in expression.parameters() if each.sign == UNKNOWN}
+    if not signless or expression.curvature != UNKNOWN:
         return ""
-    return (
-        f"; the sign of {', '.join(signless)} is not known: a weight of a convex function needs "
-        "cp.Parameter(nonneg=True)"
-    )
+    of_road = sorted(signless.intersection(STAGE))
+    own = sorted(signless.difference(STAGE))
+    said = [f"{', '.join(of_road)} may be negative, and so weigh nothing convex"] if of_road else []
+    if own:
+        said.append(
+            f"if {', '.join(own)} weighs something convex, cvxpy has to know its sign: "
+            "cp.Parameter(nonneg=True)"
+        )
+    return "".join(f"; {each}" for each in said)
 
 
 def _short(what: Any) -> str:

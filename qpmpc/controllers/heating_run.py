@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from qpmpc.controllers.safety import T_CL_MARGIN_K
+from qpmpc.controllers.safety import POWER_MARGIN_W, T_CL_MARGIN_K
 from qpmpc.preview.stages import Stages
 from qpmpc.qp.last_run import MUST_LEAST_S
 from qpmpc.qp.polish import Polish, Prices
@@ -24,7 +24,8 @@ from qpmpc.vehicle.parameters import Thermal, Vehicle
 from qpmpc.vehicle.section import STEP_S
 
 IDLING_W = 1.0  # power that stands for idling: 0 would be no wish to run
-BEYOND_K = 1e-3  # more than is missing, in the second that ends it: rounding asks for no other
+BEYOND_K = 1e-3  # beyond what is missing: rounding and the fitted curve ask for no other second
+LEAST_GROWTH = 1e-3  # of a piece's fuel power with shaft power: heat grows with it
 
 
 class _Second(NamedTuple):
@@ -62,7 +63,8 @@ def heating_run_w(
     what is missing, if it can. A start gives Q_s by itself and Q in each of the other b - 1 seconds
     of its run: left are J' = J - Q_s - (b - 1) Q + C `BEYOND_K`. Where that is more than Q and
     less than 2 Q, the power is E' = Q^-1(J') instead, if it costs no more than two seconds at E:
-    d(E') <= 2 d(E), with d(P) = alpha f(P) - w_G (l(P0) - l(P0 - P)).
+    d(E') <= 2 d(E), with d(P) = alpha f(P) - w_G (l(P0) - l(P0 - P)), and engine, ramp and the
+    battery's charging allow it.
 
     Parameters
     ----------
@@ -105,16 +107,24 @@ def heating_run_w(
         least_w = 0.0
     if one.heat_w < left_j / STEP_S < 2.0 * one.heat_w:
         all_w = _power_w(vehicle, polish, hot_w, left_j / STEP_S)
-        if second(all_w).dearer_g <= 2.0 * one.dearer_g:
+        before_w = seen.p_eng_before_w if seen.engine_on else 0.0
+        ramped_w = before_w + engine.ramp_w_per_s * STEP_S - POWER_MARGIN_W
+        most_w = min(engine.power_max_w, ramped_w, net_w + vehicle.battery_charge_max_w)
+        if all_w <= most_w and second(all_w).dearer_g <= 2.0 * one.dearer_g:
             return all_w
     return least_w
 
 
 def _power_w(vehicle: Vehicle, polish: Polish, hot_w: float, heat_w: float) -> float:
-    """Return the power that gives this heat: the least over the pieces, as fuel is the greatest."""
+    """Return the power that gives this heat: the least over the pieces, as fuel is the greatest.
+
+    A piece on which heat does not grow with power bounds nothing; infinite where none does.
+    """
     fuel, kept = polish.fuel, engine_w(vehicle.thermal, 1.0, 0.0)
-    of_pieces = (heat_w / kept - hot_w * fuel.intercept) / (hot_w * fuel.slope - 1.0)
-    return min(float(of_pieces.min()), vehicle.engine.power_max_w)
+    grows = hot_w * fuel.slope - 1.0
+    above_w = heat_w / kept - hot_w * fuel.intercept
+    of_pieces = np.where(grows > LEAST_GROWTH, above_w / np.maximum(grows, LEAST_GROWTH), np.inf)
+    return float(of_pieces.min())
 
 
 def _lasts_from_degc(thermal: Thermal, stages: Stages) -> float:

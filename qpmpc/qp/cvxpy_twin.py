@@ -41,7 +41,7 @@ UNIT = {
 
 METHODS = ("given", "state")  # that a user calls in `terms`
 # Known of a stage and never negative, so that a convex function may be weighed by it.
-NONNEGATIVE = {"duration_s", "speed_mps", "must_share"}
+NONNEGATIVE = {"duration_s", "speed_mps", "must_share", "rises"}
 
 
 class State(NamedTuple):
@@ -132,7 +132,7 @@ class CvxpyTwin:
 
         Such as `duration_s`, `net_w`, `speed_mps`: fields of `Stages`, `QUANTITIES` of
         `qpmpc.qp.rows`, numbers of `qp_parameters`. What changes is a parameter, set each second;
-        cvxpy knows that durations, speeds and shares are not negative.
+        cvxpy knows that durations, speeds, shares and rises are not negative.
 
         Raises
         ------

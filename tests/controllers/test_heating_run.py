@@ -1,5 +1,7 @@
 """The coolant at its limit: a run goes on that spares another; its last second gives the rest."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -36,16 +38,19 @@ def power_w(
     must_share: float = 0.0,
     prices: Prices = PRICES,
     engine_on: bool = True,
+    demand_w: float = DRIVING_W,
+    before_w: float = 20e3,
+    polish: Polish | None = None,
 ) -> float:
-    """So many seconds before arrival."""
+    """So many seconds before arrival, after a second at some power."""
     blocks = int((left_s - 1) // BLOCK_S)
     h = np.array([1.0, *[BLOCK_S] * blocks, left_s - 1.0 - blocks * BLOCK_S])
-    n, polish = len(h), POLISH[car]
-    off = np.full(n, polish.internal_w(DRIVING_W))
-    net_w, zero = np.full(n, DRIVING_W), np.zeros(n)
+    n, polish = len(h), polish or POLISH[car]
+    off = np.full(n, polish.internal_w(demand_w))
+    net_w, zero = np.full(n, demand_w), np.zeros(n)
     must = np.append(0.0, np.full(n - 1, must_share))
     trip = Stages(h, net_w, zero + SPEED_MPS, off, must, net_w, off, zero, zero, zero)
-    seen = Observation(9, 0.6, t_cl_degc, engine_on, DRIVING_W, SPEED_MPS)
+    seen = Observation(9, 0.6, t_cl_degc, engine_on, demand_w, SPEED_MPS, 9, before_w)
     return heating_run_w(car, polish, prices, trip, np.full(n, on_share), seen)
 
 
@@ -145,17 +150,43 @@ def test_a_start_at_the_limit_counts_its_own_heat_and_its_other_seconds() -> Non
     assert power_w(limit, ends[0] - 3, prices=POOR, engine_on=False) == 0.0
 
 
+def test_no_more_than_ramp_and_battery_allow() -> None:
+    """Power that the safety layer would cut, or the brakes take, is no heat for nothing."""
+    lack_k = 1.8 * heats_k(CAR, 0.0)
+    lacking = lasts_from_degc() - lack_k
+    raised_w = power_w(lacking, prices=POOR)
+    assert raised_w > 2e3
+    ramp_w = CAR.engine.ramp_w_per_s
+    assert power_w(lacking, prices=POOR, before_w=raised_w - ramp_w + 1.0) == raised_w
+    assert power_w(lacking, prices=POOR, before_w=raised_w - ramp_w - 1.0) == 1.0
+    charge_w = CAR.battery_charge_max_w
+    assert power_w(lacking, prices=POOR, demand_w=-charge_w + 1.01 * raised_w) > 2e3
+    assert power_w(lacking, prices=POOR, demand_w=-charge_w + 0.9 * raised_w) == 1.0
+
+
+def test_a_piece_on_which_heat_does_not_grow_bounds_nothing() -> None:
+    """An engine that turns more fuel into work than it burns there: a wrong map, no division."""
+    fuel = POLISH[CAR].fuel
+    flat = Polish(CAR, PwaModel.of(CAR))
+    slope = fuel.slope.copy()
+    slope[0] = 0.9 / (CAR.engine.lhv_j_per_g * alpha_at(CAR.cold_engine, 40.5))
+    flat.learn(replace(fuel, slope=slope))
+    lack_k = 1.5 * heats_k(CAR, 0.0)
+    asked_w = power_w(lasts_from_degc() - lack_k, prices=POOR, polish=flat)
+    assert 0.0 < asked_w <= CAR.engine.power_max_w
+
+
 def test_a_free_engine_idles_at_the_limit_and_ends_with_the_rest() -> None:
     """Of 0.03 K that are lost each second one of idling gives 0.04."""
     limit = FREE.thermal.t_cl_min_degc + T_CL_MARGIN_K
     powers = [power_w(limit, s, FREE, prices=POOR, engine_on=False) for s in range(1, 20)]
     raised = np.flatnonzero(powers)
+    assert len(raised) >= 1
     idle_k = heats_k(FREE, 0.0)
     for i in raised:
         lack_k = lasts_from_degc(int(i) + 1) - limit
         assert idle_k < lack_k + BEYOND_K < 2.0 * idle_k
         assert heats_k(FREE, powers[i]) == pytest.approx(lack_k + BEYOND_K, rel=0.01)
-    assert len(raised) >= 1
     assert power_w(limit + 0.1, int(raised[0]) + 1, FREE, prices=POOR, engine_on=False) == 0.0
 
 

@@ -77,7 +77,11 @@ WRONG = {
     "shape": (lambda s, p: (cp.sum(p.on + np.ones(20)), []), r"shape \(62,\), one entry per stage"),
     "name": (lambda s, p: (cp.sum(p.p_engine_w), []), "did you mean 'p_eng_w'"),
     "not DPP": (lambda s, p: (P * cp.sum(p.given("duration_s")) + P * P, []), "DPP"),
-    "sign": (lambda s, p: (WEIGHT * cp.square(p.soc[-1]), []), "sign of weight .*nonneg=True"),
+    "sign": (lambda s, p: (WEIGHT * cp.square(p.soc[-1]), []), "if weight weighs .*nonneg=True"),
+    "net_w": (
+        lambda s, p: (cp.sum(cp.multiply(p.given("net_w"), cp.square(p.on))), []),
+        "net_w may be negative",
+    ),
     "text": (lambda s, p: ("much", []), "the cost is much, not an"),
 }
 
@@ -151,7 +155,7 @@ def test_a_term_may_be_weighed_by_durations() -> None:
 
 
 def test_a_plan_that_cannot_be_driven_is_found_out() -> None:
-    """A price on charging, of three times what a charge is worth: losses make away with it."""
+    """A price on charging, of three times what a charge is worth: losses spare it."""
 
     def terms(self: Any, program: Any) -> Any:
         charging_kw = cp.pos(-program.internal_w / 1e3)
@@ -160,6 +164,47 @@ def test_a_plan_that_cannot_be_driven_is_found_out() -> None:
     sound, loose = (qpmpc.simulate(short(60), each) for each in (CvxpyPlanner, planner(terms)))
     gaps = [run.summary()["relaxation_gap"]["mean"] for run in (sound, loose)]
     assert gaps[0] < LOOSE_GAP < gaps[1]
-    assert "no car can drive" in loose.doubt
-    assert "no car can drive" not in sound.doubt
+    assert "off the curves of fuel and losses" in loose.doubt
+    assert "off the curves" not in sound.doubt
     assert sound.fuel_expected_g is not None
+
+
+class Failing(CvxpyPlanner):
+    """Finds no solution in some of its solves, counted from 1."""
+
+    name = "failing"
+    fails: tuple[int, ...] = ()
+    solves = 0
+
+    def solved(self) -> Any:
+        self.solves += 1
+        if self.solves in self.fails:
+            raise QpmpcError("no solution")
+        return super().solved()
+
+
+def test_a_failure_at_departure_costs_what_was_expected_and_no_plan() -> None:
+    """The first plan drives where the second linearisation of departure has no solution."""
+    trip = short()
+    mine = Failing(trip)
+    mine.fails = (2,)
+    mine.depart(trip.start)
+    assert mine.plan(trip.start).usable
+    assert mine.expects is None
+    assert mine.plan(trip.start._replace(step=1)).usable
+    assert mine.solves == 3  # it departs once
+
+
+def test_a_first_second_without_a_solution_is_not_made_up_for_later() -> None:
+    trip = short()
+    mine = Failing(trip)
+    mine.fails = (1,)
+    mine.depart(trip.start)
+    assert not mine.plan(trip.start).usable
+    assert mine.plan(trip.start._replace(step=1)).usable
+    assert mine.solves == 2
+    assert mine.expects is None
+    mine.fails = ()
+    mine.depart(trip.start)
+    assert mine.plan(trip.start).usable
+    assert mine.expects is not None
