@@ -4,7 +4,7 @@ import pytest
 
 from qpmpc.cycles import load_cycle
 from qpmpc.vehicle import DEFAULT_VEHICLE
-from qpmpc.verification.epa import (
+from qpmpc.verification.epa.figures import (
     CASES,
     OFF_EPA,
     TOLERANCE,

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from qpmpc.vehicle import DEFAULT_VEHICLE
 from qpmpc.verification.checks.check import Check
 from qpmpc.verification.checks.context import Context
-from qpmpc.verification.epa import (
+from qpmpc.verification.epa.figures import (
     AS_FITTED,
     CASES,
     OFF_EPA,

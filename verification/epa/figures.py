@@ -7,7 +7,6 @@ fits: with an engine that starts at no cost, `paper-nimh`, and with starts and a
 winter, the default car.
 """
 
-import sys
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -40,7 +39,7 @@ _COLD = {
     "thermal.cabin_heat_full_degc": 55.0,
 }
 # S EPA's schedule, 40 CFR Part 86, Appendix I; public domain in the United States
-US06 = Path(str(resources.files("qpmpc.verification.checks"))) / "us06.csv"
+US06 = Path(str(resources.files("qpmpc.verification.epa"))) / "us06.csv"
 _HOT_RULES: dict[str, object] = {"rule_based.heat_on_degc": 40.0, "rule_based.heat_off_degc": 45.0}
 _COLD_RULES: dict[str, object] = {"rule_based.heat_on_degc": 60.0, "rule_based.heat_off_degc": 64.0}
 
@@ -118,7 +117,3 @@ def main() -> int:
         )
     Console().print(table)
     return 0 if worst <= TOLERANCE and furthest <= OFF_EPA else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,0 +1,1 @@
+"""The rules on EPA's cycles beside EPA's dynamometer figures."""
