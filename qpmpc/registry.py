@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from qpmpc.controllers.base import Controller
 from qpmpc.controllers.receding_horizon import Planner, RecedingHorizon
-from qpmpc.controllers.settings import ControllerSettings, refuse_old_name
+from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.cycles.load import CYCLES
 from qpmpc.errors import InputError
 from qpmpc.names import Names, Shipped, hint, unknown
@@ -212,15 +212,6 @@ def split_settings(
     """
     of_vehicle = {key: value for key, value in settings.items() if _is_of_trip(key)}
     of_controllers = {key: value for key, value in settings.items() if key not in of_vehicle}
-    for key in of_controllers:
-        refuse_old_name(key, of_controllers[key])
-        if key in {*ControllerSettings.sections(), *Vehicle.model_fields} - _SCALARS:
-            raise InputError(f"{key!r} is a section: set its parameters one by one, {key}.NAME")
-        if "." not in key:
-            raise InputError(
-                f"no parameter {shown_value(key)}{hint_in(key, _SETTABLE)} names start with a "
-                "section and a dot, such as thermal.t_amb_degc or mh_qp.admm.iterations"
-            )
     chosen = ControllerSettings().with_settings(of_controllers)
     check_sections(chosen, controllers)
     return of_vehicle, chosen
@@ -259,7 +250,11 @@ def check_sections(
                 - _SCALARS
             )
             key = ".".join([section, *list(values)[:1]])
-            meant = hint(section, known) if nearest(section, known) else hint_in(key, _SETTABLE)
+            meant = (
+                hint(section, known)
+                if nearest(section, known)
+                else hint_in(key, (Vehicle, ControllerSettings))
+            )
             raise InputError(
                 f"no parameter {shown_value(key)}{meant} names start with "
                 f"one of {', '.join(known)} and a dot"
@@ -311,7 +306,6 @@ _READS = {
     **dict.fromkeys(PLANTS.shipped, ()),
 }
 _SCALARS = {"name", "description", "base"}
-_SETTABLE = (Vehicle, ControllerSettings)
 
 
 def _section(name: str) -> str:

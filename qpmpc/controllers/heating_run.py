@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from qpmpc.controllers.safety import POWER_MARGIN_W, T_CL_MARGIN_K
+from qpmpc.controllers.safety import T_CL_MARGIN_K, greatest_w
 from qpmpc.preview.stages import Stages
 from qpmpc.qp.last_run import MUST_LEAST_S
 from qpmpc.qp.polish import Polish, Prices
@@ -107,9 +107,7 @@ def heating_run_w(
         least_w = 0.0
     if one.heat_w < left_j / STEP_S < 2.0 * one.heat_w:
         all_w = _power_w(vehicle, polish, hot_w, left_j / STEP_S)
-        before_w = seen.p_eng_before_w if seen.engine_on else 0.0
-        ramped_w = before_w + engine.ramp_w_per_s * STEP_S - POWER_MARGIN_W
-        most_w = min(engine.power_max_w, ramped_w, net_w + vehicle.battery_charge_max_w)
+        most_w = min(greatest_w(engine, seen, STEP_S), net_w + vehicle.battery_charge_max_w)
         if all_w <= most_w and second(all_w).dearer_g <= 2.0 * one.dearer_g:
             return all_w
     return least_w

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from qpmpc.trip import Observation
 from qpmpc.vehicle.engine import alpha_at
+from qpmpc.vehicle.engine_parameters import Engine
 from qpmpc.vehicle.heat import cooling_w, engine_w
 from qpmpc.vehicle.must_run import too_fast
 from qpmpc.vehicle.plant import Command, Plant
@@ -42,6 +43,13 @@ class Interval(NamedTuple):
         return Interval(min(self.low_w + by_w, self.high_w), self.high_w)
 
 
+def greatest_w(engine: Engine, seen: Observation, step_s: float) -> float:
+    """Greatest power of the engine in the coming second: its own, or what the ramp leads to."""
+    before_w = seen.p_eng_before_w if seen.engine_on else 0.0
+    ramped_w = before_w + engine.ramp_w_per_s * step_s - POWER_MARGIN_W
+    return max(min(ramped_w, engine.power_max_w), engine.power_min_w)
+
+
 class SafetyLayer:
     """Corrects a command so that the next second keeps power, SOC and coolant limits.
 
@@ -67,7 +75,7 @@ class SafetyLayer:
         """Return the admissible command nearest to `wish`."""
         engine = self._vehicle.engine
         heat = _EngineHeat(self, seen)
-        running = Interval(engine.power_min_w, self._greatest_w(seen))
+        running = Interval(engine.power_min_w, greatest_w(engine, seen, self._plant.step_s))
         cranking_w = 0.0 if seen.engine_on else engine.start_energy_j / self._plant.step_s
         on_excess: list[float] = []
         off_excess: list[float] = []
@@ -93,13 +101,6 @@ class SafetyLayer:
         if not on:
             return Command(False, 0.0)
         return Command(True, min(max(wanted_w, running.low_w), running.high_w))
-
-    def _greatest_w(self, seen: Observation) -> float:
-        """Greatest power of the running engine: its own, or what the ramp leads to."""
-        engine = self._vehicle.engine
-        before_w = seen.p_eng_before_w if seen.engine_on else 0.0
-        ramped_w = before_w + engine.ramp_w_per_s * self._plant.step_s - POWER_MARGIN_W
-        return max(min(ramped_w, engine.power_max_w), engine.power_min_w)
 
     def _lasting(self, wish: Command, seen: Observation) -> tuple[bool, float]:
         """Engine on or off, and its power if on; as before while its shortest run or rest lasts."""

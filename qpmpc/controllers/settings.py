@@ -8,13 +8,13 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from qpmpc.errors import InputError
 from qpmpc.preview.horizon import HorizonSettings
-from qpmpc.problems import shown_value
+from qpmpc.problems import leaf_keys, shown_value
 from qpmpc.pwa.model import PwaTolerances
 from qpmpc.qp.scaling import ScalingSettings
 from qpmpc.qp.settings import QpSettings
-from qpmpc.settings import apply_settings, validated
+from qpmpc.settings import apply_settings, hint_in, validated
 from qpmpc.solvers.settings import AdmmSettings
-from qpmpc.vehicle.parameters import Battery
+from qpmpc.vehicle.parameters import Battery, Vehicle
 
 Model = TypeVar("Model", bound=BaseModel)
 Watts = Annotated[float, Field(ge=0.0, le=1e6)]  # beyond any engine and battery together
@@ -246,10 +246,7 @@ class ControllerSettings(BaseModel):
             refuse_old_name(key, value)
             section, _, rest = key.partition(".")
             if not rest:
-                raise InputError(
-                    f"no parameter {shown_value(key)}: names start with a section and a dot, "
-                    "such as mh_qp.admm.iterations"
-                )
+                raise InputError(_without_section(key))
             if section in self.sections():
                 ours[key] = value
             else:
@@ -257,6 +254,19 @@ class ControllerSettings(BaseModel):
         data = apply_settings(self.model_dump(), ours, owner="controller settings")
         data["others"] = others
         return validated(ControllerSettings, data, "controller settings")
+
+
+def _without_section(key: str) -> str:
+    """Return the message for a name without a dot: a section, or a parameter of one."""
+    models = (Vehicle, ControllerSettings)
+    if key in {
+        name.partition(".")[0] for model in models for name in leaf_keys(model) if "." in name
+    }:
+        return f"{key!r} is a section: set its parameters one by one, {key}.NAME"
+    return (
+        f"no parameter {shown_value(key)}{hint_in(key, models)} names start with a section and a "
+        "dot, such as thermal.t_amb_degc or mh_qp.admm.iterations"
+    )
 
 
 # Old and new names of settings, below the section of the controller.
