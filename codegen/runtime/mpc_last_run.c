@@ -31,40 +31,36 @@ static int32_t is_asked(const mpc_state *state, const mpc_prices *prices)
                                                                                                : 0;
 }
 
-mpc_real mpc_last_run_w(const mpc_state *state, const mpc_prices *prices)
+mpc_real mpc_last_run_w(const mpc_state *state, const mpc_prices *prices, const mpc_going *now)
 {
-    const mpc_going now = mpc_polish_going(state, prices, 0);
-    const mpc_real wanted_s = wanted_j(state, MPC_STAGES) / real_max(now.gain_w, LEAST_GAIN_W);
+    const mpc_real wanted_s = wanted_j(state, MPC_STAGES) / real_max(now->gain_w, LEAST_GAIN_W);
     const mpc_real run_s = (mpc_real)mpc_par.min_on_s;
     const int32_t is_one_run = ((wanted_s >= (WANTED_LEAST * run_s)) && (wanted_s <= run_s)) ? 1
                                                                                              : 0;
     const int32_t pays =
-        ((now.gain_w >= LEAST_GAIN_W) && ((now.dearer * wanted_s) <= state->cal.start_fuel_g))
+        ((now->gain_w >= LEAST_GAIN_W) && ((now->dearer * wanted_s) <= state->cal.start_fuel_g))
             ? is_one_run
             : 0;
     const int32_t goes =
         ((state->watch.good.engine_on != 0) && (is_asked(state, prices) != 0)) ? pays : 0;
-    return (goes != 0) ? now.power_w : REAL(0.0);
+    return (goes != 0) ? now->power_w : REAL(0.0);
 }
 
-mpc_real mpc_last_start_w(const mpc_state *state, const mpc_prices *prices)
+mpc_real mpc_last_start_w(const mpc_state *state, const mpc_prices *prices, const mpc_going *second)
 {
     const int32_t run_s = mpc_par.min_on_s;
     mpc_real dearer_g[MPC_SHORT];
-    mpc_real power_w = REAL(0.0);
     mpc_real gives_j = REAL(0.0);
     mpc_real lasts_s = REAL(0.0);
     mpc_real now_g = REAL(0.0);
     mpc_real run_g = REAL(0.0); /* of the run that ends with second k */
     mpc_real least_g = REAL(0.0);
     for (int32_t k = 0; k < MPC_SHORT; k++) {
-        const mpc_going second = mpc_polish_going(state, prices, k);
         const mpc_real h = state->stage[k].road.duration_s;
-        dearer_g[k] = h * second.dearer;
+        dearer_g[k] = h * second[k].dearer;
         run_g += dearer_g[k];
         if (k < run_s) {
-            power_w = (k == 0) ? second.power_w : power_w;
-            gives_j += h * second.gain_w;
+            gives_j += h * second[k].gain_w;
             lasts_s += h;
             now_g = run_g;
         } else {
@@ -82,5 +78,5 @@ mpc_real mpc_last_start_w(const mpc_state *state, const mpc_prices *prices)
     const int32_t lasts = ((run_s > 0) && (lasts_s >= (mpc_real)run_s)) ? pays : 0;
     const int32_t begins =
         ((state->watch.good.engine_on == 0) && (is_asked(state, prices) != 0)) ? lasts : 0;
-    return (begins != 0) ? power_w : REAL(0.0);
+    return (begins != 0) ? second[0].power_w : REAL(0.0);
 }

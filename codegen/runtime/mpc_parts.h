@@ -74,11 +74,14 @@ mpc_going mpc_polish_going(const mpc_state *state, const mpc_prices *prices, int
 /* Where the coming second runs beside the plan, at its least-cost power power_w (mpc_polish.c); 0
  * elsewhere. mpc_empty_battery.c: where the battery or the ramp needs the engine, with the ramp's power
  * at least. mpc_last_run.c: where a run goes on for all that the plan still wants, or begins for it in
- * time. mpc_heating_run.c: where it goes on for the heat that the coolant lacks, or one second
- * gives all of it. */
+ * time. mpc_short_run.c: where one that is shorter than it may be begins before its time. Both of the
+ * seconds of the short horizon with the engine on. mpc_heating_run.c: where a run goes on for the heat
+ * that the coolant lacks, or one second gives all of it. */
 mpc_real mpc_empty_battery_w(const mpc_state *state, mpc_real power_w, mpc_real ramp_w);
-mpc_real mpc_last_run_w(const mpc_state *state, const mpc_prices *prices);
-mpc_real mpc_last_start_w(const mpc_state *state, const mpc_prices *prices);
+mpc_real mpc_last_run_w(const mpc_state *state, const mpc_prices *prices, const mpc_going *now);
+mpc_real mpc_last_start_w(const mpc_state *state, const mpc_prices *prices,
+                          const mpc_going *second);
+mpc_real mpc_short_run_w(const mpc_state *state, const mpc_prices *prices, const mpc_going *second);
 mpc_real mpc_heating_run_w(const mpc_state *state, const mpc_prices *prices, mpc_real power_w);
 
 /* mpc_ramp.c: what the ramp asks of the coming second */

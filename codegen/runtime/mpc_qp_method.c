@@ -80,12 +80,21 @@ void mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p_eng
 mpc_real mpc_method_least_w(const mpc_state *state)
 {
     const mpc_prices prices = mpc_polish_prices(state);
+#if MPC_STARTS
+    mpc_going second[MPC_SHORT];
+    for (int32_t k = 0; k < MPC_SHORT; k++) {
+        second[k] = mpc_polish_going(state, &prices, k);
+    }
+    const mpc_real power_w = second[0].power_w;
+#else
     const mpc_real power_w = mpc_polish_power_w(state, &prices, 0, REAL(0.0));
+#endif
     const mpc_real ramp_w = mpc_ramp_least_w(state);
     mpc_real least_w = real_max(ramp_w, mpc_empty_battery_w(state, power_w, ramp_w));
 #if MPC_STARTS
-    least_w = real_max(least_w, mpc_last_run_w(state, &prices));
-    least_w = real_max(least_w, mpc_last_start_w(state, &prices));
+    least_w = real_max(least_w, mpc_last_run_w(state, &prices, &second[0]));
+    least_w = real_max(least_w, mpc_last_start_w(state, &prices, second));
+    least_w = real_max(least_w, mpc_short_run_w(state, &prices, second));
 #endif
     return real_max(least_w, mpc_heating_run_w(state, &prices, power_w));
 }

@@ -14,6 +14,7 @@ from qpmpc.controllers.ramp import RampFloor
 from qpmpc.controllers.realise import STAY_SHARE, power_while_on_w
 from qpmpc.controllers.receding_horizon import Plan, Planner
 from qpmpc.controllers.settings import ControllerSettings, MhQpSettings, SettingsLike
+from qpmpc.controllers.short_run import short_run_w
 from qpmpc.errors import InputError
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.learned_fuel import LearnedFuel
@@ -196,7 +197,8 @@ class QpPlanner(Planner):
                 least_w = max(least_w, going_w)
             else:
                 starts_w = last_start_w(engine, polish, prices, stages, internal_w, short.stop)
-                least_w = max(least_w, starts_w)
+                early_w = short_run_w(engine, polish, prices, stages, on_share)
+                least_w = max(least_w, starts_w, early_w)
             heating_w = heating_run_w(vehicle, polish, prices, stages, x[:, Var.ON], seen)
             least_w = max(least_w, heating_w)
         return Plan(
