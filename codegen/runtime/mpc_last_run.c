@@ -52,6 +52,8 @@ mpc_real mpc_last_start_w(const mpc_state *state, const mpc_prices *prices, cons
     mpc_real dearer_g[MPC_SHORT];
     mpc_real gives_j = REAL(0.0);
     mpc_real lasts_s = REAL(0.0);
+    mpc_real goes_on_g = REAL(0.0); /* of the run from now on, after the shortest, up to second k */
+    mpc_real best_g = REAL(0.0);
     mpc_real now_g = REAL(0.0);
     mpc_real run_g = REAL(0.0); /* of the run that ends with second k */
     mpc_real least_g = REAL(0.0);
@@ -66,6 +68,8 @@ mpc_real mpc_last_start_w(const mpc_state *state, const mpc_prices *prices, cons
         } else {
             run_g -= dearer_g[k - run_s];
             least_g = real_min(least_g, run_g);
+            goes_on_g += dearer_g[k];
+            best_g = real_min(best_g, goes_on_g);
         }
     }
     const mpc_real all_j = wanted_j(state, MPC_STAGES);
@@ -74,7 +78,8 @@ mpc_real mpc_last_start_w(const mpc_state *state, const mpc_prices *prices, cons
         ((all_j >= (START_LEAST * gives_j)) && (all_j <= (START_MOST * gives_j))) ? 1 : 0;
     const int32_t is_soon = (soon_j >= (START_SOON * all_j)) ? is_one_run : 0;
     const int32_t is_best = (now_g <= (least_g + SAME_G)) ? is_soon : 0;
-    const int32_t pays = (now_g <= -state->cal.start_fuel_g) ? is_best : 0;
+    const mpc_real start_g = START_PAYS * state->cal.start_fuel_g;
+    const int32_t pays = ((now_g + best_g) <= -start_g) ? is_best : 0;
     const int32_t lasts = ((run_s > 0) && (lasts_s >= (mpc_real)run_s)) ? pays : 0;
     const int32_t begins =
         ((state->watch.good.engine_on == 0) && (is_asked(state, prices) != 0)) ? lasts : 0;

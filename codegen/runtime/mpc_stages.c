@@ -29,6 +29,29 @@ static int32_t begun_s(const mpc_measured *good)
     return (good->engine_on != 0) ? (mpc_par.min_on_s - good->engine_for_s) : 0;
 }
 
+/* Whether a block has seconds of the classes from one stage up to another. */
+static int32_t has(const mpc_in *in, int32_t from, int32_t to)
+{
+    int32_t found = 0;
+    for (int32_t k = from; k < to; k++) {
+        found |= (in->long_duration_s[k] > REAL(0.0)) ? 1 : 0;
+    }
+    return found;
+}
+
+/* Starts per on-share that a stage has more than the one before. What rises into a class of a block,
+ * falls from it to the next stage, the class below; the first is entered from the block before, and
+ * classes without a second hand its last on-share on. */
+static mpc_real rises_of(const mpc_state *state, const mpc_in *in, int32_t k)
+{
+    const int32_t begins = k - (k % MPC_CLASSES);
+    const int32_t inside = has(in, begins, k) & has(in, k, begins + MPC_CLASSES);
+    const mpc_real rises = (k > begins) ? (in->long_rises[k - 1] - mpc_par.entry_share) : REAL(0.0);
+    const mpc_real falls = state->cal.rise_share * real_max(rises, REAL(0.0));
+    const mpc_real enters = (MPC_CLASSES > 1) ? mpc_par.entry_share : REAL(0.0);
+    return (inside != 0) ? -falls : enters;
+}
+
 /* Preview to stages: seconds first, then the classes of each block; past stages are masked. */
 void mpc_stages_take(mpc_state *state, const mpc_in *in)
 {
@@ -60,9 +83,7 @@ void mpc_stages_take(mpc_state *state, const mpc_in *in)
         stage->road.must_share = in->long_must_share[k];
         stage->road.free_net_w = in->long_free_net_w[k];
         stage->road.free_internal_off_w = in->long_free_internal_off_w[k];
-        /* what rises into a class, falls from it to the next stage, the class below */
-        stage->road.rises =
-            ((k % MPC_CLASSES) > 0) ? (-state->cal.rise_share * in->long_rises[k - 1]) : REAL(0.0);
+        stage->road.rises = rises_of(state, in, k);
         /* inside a block SOC is not limited: the order of its classes in time is not known */
         const int32_t ends_block = ((k % MPC_CLASSES) == (MPC_CLASSES - 1)) ? 1 : 0;
         stage->road.fall_j = (ends_block != 0) ? in->long_fall_j[k] : -NO_LIMIT_J;

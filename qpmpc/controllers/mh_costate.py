@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from qpmpc.controllers.ramp import RampFloor
 from qpmpc.controllers.receding_horizon import Plan, Planner
@@ -36,7 +36,7 @@ class MhCostateSettings(BaseModel):
 
     Attributes
     ----------
-    horizon : layout of the stages, as of `mh_qp`
+    horizon : layout of the stages, as of `mh_qp`, without `entry_share`: blocks are apart
     limits : terminal band and margins, as of `mh_qp.qp`; it comes nearer to a limit than an
         iteration that is stopped, and needs less of a margin to it
     rounds : Newton rounds of a second
@@ -45,10 +45,17 @@ class MhCostateSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    horizon: HorizonSettings = HorizonSettings(blocks=20)
+    horizon: HorizonSettings = HorizonSettings(blocks=20, entry_share=0.0)
     limits: LimitSettings = LimitSettings(t_cl_margin_k=0.1)
     rounds: Annotated[int, Field(ge=1, le=1000)] = 5
     implementation: Literal["auto", "c", "python"] = "auto"
+
+    @field_validator("horizon")
+    @classmethod
+    def _apart(cls, horizon: HorizonSettings) -> HorizonSettings:
+        if horizon.entry_share:
+            raise ValueError("entry_share must be 0: its blocks share prices alone")
+        return horizon
 
 
 def unit_g(model: PwaModel) -> float:

@@ -86,7 +86,8 @@ def blocks_least(
 ) -> float:
     """Return the least cost of the long stages, engine on or off in each, starts included.
 
-    Starts couple the stages of a block alone: all choices of a block are compared.
+    Starts couple the stages of a block: all choices of a block are compared. What couples blocks is
+    left out, or where a start pays by its heat taken in full: then no choice costs less.
 
     Parameters
     ----------
@@ -105,4 +106,4 @@ def blocks_least(
         starts = np.maximum(sign[:, 1:] * np.diff(runs), 0.0)
         stages = np.where(runs > 0.0, on, off).sum(axis=1)
         totals.append(stages + (price[:, 1:] * starts).sum(axis=1))
-    return float(np.min(totals, axis=0).sum())
+    return float((np.min(totals, axis=0) + np.minimum(price[:, 0], 0.0)).sum())

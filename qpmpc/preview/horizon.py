@@ -28,6 +28,8 @@ class HorizonSettings(BaseModel):
         limits at the end of a block are tightened, see `qpmpc.preview.swing`
     rise_share : starts that a block costs, per rise of its demand into a class and per on-share
         there. Less than 1: an engine that runs in part of a class does so in its longest episodes
+    entry_share : starts that a block costs, per on-share there that is more than at the end of the
+        block before; as much less of its first rise counts
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -40,6 +42,7 @@ class HorizonSettings(BaseModel):
     class_braking_w: Annotated[float, Field(ge=-1e6, le=1e6)] = -500.0
     swing_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.85
     rise_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.75
+    entry_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.25
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -54,7 +57,7 @@ class HorizonSettings(BaseModel):
         if not has_blocks:
             found.add("classes")
         if not has_blocks or self.classes == 1:
-            found |= {"class_hard_w", "class_braking_w", "swing_share", "rise_share"}
+            found |= {"class_hard_w", "class_braking_w", "swing_share", "rise_share", "entry_share"}
         return found
 
     def place_s(self, trip_steps: int) -> int:

@@ -212,7 +212,7 @@ class StageBuilder:
         )
         rises = np.zeros(self.count)
         rises[:seen] = 1.0
-        rises[n:] = starts_per_rise(long.rises, self.settings)
+        rises[n:] = starts_per_rise(long.rises, long.duration_s, self.settings)
         swing_j = np.zeros((2, self.count))
         swing_j[1, n - 1] = preview.short_rise_j
         classes = self.settings.classes
@@ -342,12 +342,28 @@ def _cumulative_rises(demand_class: NDArray[np.intp], classes: int) -> NDArray[n
     return sums
 
 
-def starts_per_rise(rises: NDArray[np.float64], settings: HorizonSettings) -> NDArray[np.float64]:
+def starts_per_rise(
+    rises: NDArray[np.float64], duration_s: NDArray[np.float64], settings: HorizonSettings
+) -> NDArray[np.float64]:
     """Rises into each class of a block as `Stages.rises`, for stages from hard down to braking.
 
     A rise into a class starts the engine if it runs there and not below. The class below is the
-    next stage, in which the on-share falls by what it rises from there: hence the sign.
+    next stage, in which the on-share falls by what it rises from there: hence the sign. With kappa
+    = `entry_share`,
+
+        r = -rise_share max(rises - kappa, 0)   from one class that the block has to the next,
+        r = kappa                               from the block before to the first that it has
+
+    and from there to those beside them that it has not, which so hand its last on-share on.
     """
-    of_stage = np.zeros_like(rises).reshape(-1, settings.classes)
-    of_stage[:, 1:] = -settings.rise_share * rises.reshape(-1, settings.classes)[:, :-1]
+    classes, entry = settings.classes, settings.entry_share
+    of_stage = np.zeros_like(rises).reshape(-1, classes)
+    if classes == 1:  # an averaged preview has no order in time at all
+        return of_stage.ravel()
+    has = duration_s.reshape(-1, classes) > 0.0
+    from_first = np.logical_or.accumulate(has, axis=1)[:, :-1]
+    to_last = np.logical_or.accumulate(has[:, ::-1], axis=1)[:, -2::-1]
+    falls = settings.rise_share * np.maximum(rises.reshape(-1, classes)[:, :-1] - entry, 0.0)
+    of_stage[:, 0] = entry
+    of_stage[:, 1:] = np.where(from_first & to_last, -falls, entry)
     return of_stage.ravel()

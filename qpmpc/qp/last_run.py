@@ -21,6 +21,7 @@ LEAST_GAIN_W = 1000.0  # that the battery must gain while a run goes on, or it g
 WANTED_LEAST = 0.5  # of a shortest run: less than that the plan would never start the engine for
 FUEL_LEAST = 0.5  # g that a gram of fuel costs, its heat set off: below it the plan wants heat
 START_LEAST, START_MOST = 0.5, 1.5  # of what a shortest run gives: what is wanted is that run
+START_PAYS = 0.85  # of a start's fuel: the plan pays for just the part of a start that it makes
 START_SOON = 0.5  # of that is wanted in the seconds ahead: else better ones may come
 SAME_G = 1e-5  # less is rounding: one start is as good as another
 MUST_LEAST_S = 1e-3  # less is rounding: no second ahead has to run
@@ -76,10 +77,14 @@ def last_start_w(
 
     With g_k and d_k of the k-th second as in `last_run_w`, a shortest run that begins in j seconds
     costs D_j, the sum of d_k over its b seconds, more than a rest, and one from now on gives J,
-    that of g_k. It begins if it pays for its start, D_0 <= -c, if no other in the short horizon
-    costs less, if W is about that run, J / 2 <= W <= 3 J / 2, if the plan wants half of W or more
-    in the short horizon, and if no second ahead has to run anyway. Neither where the plan wants
-    heat nor where the trip ends sooner than the run. To be asked while the engine rests.
+    that of g_k. It begins if it pays for its start, as long as it best lasts,
+
+        D_0 + min(0, min_m sum of d_k over k = b .. m) <= -`START_PAYS` c
+
+    if no other shortest run in the short horizon costs less, if W is about that run,
+    J / 2 <= W <= 3 J / 2, if the plan wants half of W or more in the short horizon, and if no
+    second ahead has to run anyway. Neither where the plan wants heat nor where the trip ends sooner
+    than the run. To be asked while the engine rests.
 
     Parameters
     ----------
@@ -98,15 +103,16 @@ def last_start_w(
     run = [going(k) for k in range(run_s)]
     gives_j = sum(second.gain_w for second in run)
     of_all_j = wanted_j(stages, internal_w)
-    pays = sum(second.dearer_g_per_s for second in run) <= -engine.start_fuel_g
     is_one_run = START_LEAST * gives_j <= of_all_j <= START_MOST * gives_j
     is_soon = wanted_j(stages, internal_w, short_stages) >= START_SOON * of_all_j
-    if not (pays and is_one_run and is_soon):
+    if not (is_one_run and is_soon):
         return 0.0
     seconds = [*run, *(going(k) for k in range(run_s, short_stages))]
     dearer_g = stages.duration_s[:short_stages] * [second.dearer_g_per_s for second in seconds]
     runs_g = np.convolve(dearer_g, np.ones(run_s), "valid")
-    return run[0].power_w if runs_g[0] <= runs_g.min() + SAME_G else 0.0
+    goes_on_g = np.cumsum(dearer_g[run_s:]).min(initial=0.0)
+    pays = runs_g[0] + goes_on_g <= -START_PAYS * engine.start_fuel_g
+    return run[0].power_w if pays and runs_g[0] <= runs_g.min() + SAME_G else 0.0
 
 
 def wanted_j(
