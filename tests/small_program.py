@@ -20,7 +20,7 @@ from qpmpc.vehicle import load_vehicle
 Floats = NDArray[np.float64]
 
 SHORT = 5
-HORIZON = HorizonSettings(short_stages=SHORT, blocks=1)
+HORIZON = HorizonSettings(short_stages=SHORT, blocks=1, entry_share=0.0)
 POWERS = 25  # tried in each stage
 # of the part of NYCC that the programs see: a minute, so that a terminal SOC a little below or
 # above that of departure can be had

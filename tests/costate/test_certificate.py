@@ -63,6 +63,17 @@ def test_never_above_the_exact_solution(case):
         assert dual(p, anywhere(p, seed)).value <= cost + 1e-6
 
 
+def test_never_above_where_a_block_pays_for_being_entered():
+    """As in the QP."""
+    p, layout = program("prius-liion", 5, 0.599, 60.0, False)
+    rises = p.rises.copy()
+    rises[layout.short] = 1.0
+    coupled = replace(p, rises=rises)
+    cost, _ = exact(coupled, layout)
+    for seed in range(15):
+        assert bound(coupled, layout, anywhere(coupled, seed)) <= cost + 1e-6
+
+
 def test_near_the_exact_solution(case):
     """What is left is the duality gap of on or off: in the best plan of eight stages, three of
     them long and wholly on or off, up to 0.7 g; a plan of a hundred stages can do better."""

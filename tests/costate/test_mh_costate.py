@@ -146,6 +146,8 @@ def test_settings_by_name(road):
     assert (sizes.stages, made.library.values.iterations) == (20 + 9, 2)
     with pytest.raises(InputError, match="rounds"):
         split_settings({"mh_costate.rounds": 0}, ["mh-costate"])
+    with pytest.raises(InputError, match="entry_share must be 0"):
+        split_settings({"mh_costate.horizon.entry_share": 0.5}, ["mh-costate"])
     idle = simulate("nycc", "rule-based", settings={"mh_costate.rounds": 2}).remarks
     assert any("no effect on rule-based: mh_costate.rounds" in line for line in idle)
 

@@ -65,17 +65,24 @@ def test_what_must_be_breaks_a_rest():
     assert found.runs[0]
 
 
-@given(st.lists(st.tuples(COSTS, COSTS, COSTS, st.floats(0.0, 3.0)), min_size=3, max_size=3))
-def test_a_block_is_the_best_of_its_choices(stages):
+@given(
+    st.lists(st.tuples(COSTS, COSTS, COSTS, st.floats(0.0, 3.0)), min_size=3, max_size=3),
+    st.floats(0.0, 1.0),
+)
+def test_a_block_is_the_best_of_its_choices(stages, entry):
+    """And no dearer than that where it is entered, though a start paid by its heat."""
     on, off, start, rises = (np.array(values) for values in zip(*stages, strict=True))
     rises = -rises
     rises[0] = 0.0
-    tried = []
+    tried, entered = [], []
     for runs in product((0, 1), repeat=3):
         cost = sum(a if r else b for r, a, b in zip(runs, on, off, strict=True))
         for k in (1, 2):
             cost += start[k] * max(rises[k] * (runs[k] - runs[k - 1]), 0.0)
         tried.append(cost)
+        entered += [cost + start[0] * entry * max(runs[0] - before, 0) for before in (0, 1)]
     both = [np.tile(values, 2) for values in (on, off, start, rises)]
     assert blocks_least(*both, 3) == pytest.approx(2.0 * min(tried), abs=1e-12)
     assert blocks_least(on[:0], off[:0], start[:0], rises[:0], 3) == 0.0
+    coupled = np.append(entry, rises[1:])
+    assert blocks_least(on, off, start, coupled, 3) <= min(entered) + 1e-12

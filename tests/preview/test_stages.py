@@ -1,5 +1,6 @@
 """Stages: what the horizon says of the road is what the road is, in a fixed number of slots."""
 
+import cvxpy
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,6 +8,7 @@ from hypothesis import strategies as st
 
 from qpmpc.cycles import load_cycle
 from qpmpc.preview import HorizonSettings, StageBuilder, Trace
+from qpmpc.preview.stages import starts_per_rise
 from qpmpc.vehicle import load_vehicle
 from qpmpc.vehicle.must_run import must_run, whole_runs
 
@@ -81,10 +83,46 @@ def test_rises_are_those_of_the_demand_beyond_the_short_horizon(step, short, blo
     counted = min(short, NYCC.steps - step)
     np.testing.assert_array_equal(stages.rises[:counted], 1.0)
     np.testing.assert_array_equal(stages.rises[counted:short], 0.0)
-    of_class = stages.rises[short:].reshape(blocks, 3)
     # what rises from the easy to the hard seconds falls from the hard stage to the easy one
-    np.testing.assert_array_equal(of_class[:, 0], 0.0)
-    np.testing.assert_array_equal(of_class[:, 1:], -layout.rise_share * found[:, :2])
+    has = stages.duration_s[short:].reshape(blocks, 3) > 0.0
+    for number, of_class in enumerate(stages.rises[short:].reshape(blocks, 3)):
+        there = np.flatnonzero(has[number])
+        for k in range(3):
+            if len(there) and there[0] < k <= there[-1]:
+                counted = max(found[number, k - 1] - layout.entry_share, 0.0)
+                assert of_class[k] == -layout.rise_share * counted
+            else:
+                assert of_class[k] == layout.entry_share
+
+
+@given(
+    shares=st.lists(st.floats(0.0, 1.0), min_size=12, max_size=12),
+    has=st.lists(st.booleans(), min_size=12, max_size=12),
+    rises=st.lists(st.integers(0, 4), min_size=12, max_size=12),
+    before=st.floats(0.0, 1.0),
+)
+def test_classes_without_a_second_hand_the_on_share_on(shares, has, rises, before):
+    """Starts that a plan pays for at least: those of the chain of the classes that are there."""
+    layout = HorizonSettings()
+    counted = starts_per_rise(np.array(rises, float), np.array(has, float), layout)
+    there = [k for k in range(12) if has[k]]
+    paid, last = 0.0, (-1, before)
+    for k in there:
+        step = shares[k] - last[1]
+        if last[0] // 3 == k // 3 and last[0] >= 0:
+            falls = counted[last[0] + 1 : k + 1]
+            paid += max(float(falls.max()) * step, 0.0)
+        else:
+            paid += max(layout.entry_share * step, 0.0)
+        last = (k, shares[k])
+    # on-shares of the others, free of cost by themselves: what makes the fewest starts
+    share, starts = cvxpy.Variable(12), 0.0
+    for k in range(12):
+        previous = before if k == 0 else share[k - 1]
+        starts += cvxpy.pos(float(counted[k]) * (share[k] - previous))
+    limits = [share >= 0.0, share <= 1.0, *(share[k] == shares[k] for k in there)]
+    least = cvxpy.Problem(cvxpy.Minimize(starts), limits).solve(solver="CLARABEL")
+    assert least == pytest.approx(paid, abs=1e-5)
 
 
 @pytest.mark.parametrize("classes", [1, 3])

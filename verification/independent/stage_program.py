@@ -56,7 +56,9 @@ def horizon(
     The next N seconds one by one; then what is left, in equal blocks, or in blocks of N seconds
     where that is more; each split into hard, easy and braking seconds.
     On from the hard to the easy seconds of a block the engine stops, and
-    starts again, as often as the demand rises into the hard ones; likewise from easy to braking.
+    starts again, as often as the demand rises into the hard ones; likewise from easy to braking. A
+    part of the first of these starts is counted where the block is entered, by what is on there and
+    was not in the last seconds before.
     """
     grid, equations = settings.horizon, Equations(vehicle)
     demand, net = equations.demand_w(cycle), equations.net_w(cycle)
@@ -84,14 +86,19 @@ def horizon(
             classes[0 if hard else 2 if braking else 1].append(t)
         into_hard = [t for t in seconds if demand[t - 1] <= grid.class_hard_w < demand[t]]
         off_braking = [t for t in seconds if demand[t - 1] < grid.class_braking_w <= demand[t]]
-        for member, entries in zip(classes, ([], into_hard, off_braking), strict=True):
+        has = [number for number, member in enumerate(classes) if member]
+        starts = [grid.entry_share] * 3
+        for number, entries in ((1, into_hard), (2, off_braking)):
+            if has and has[0] < number <= has[-1]:
+                starts[number] = -grid.rise_share * max(len(entries) - grid.entry_share, 0.0)
+        for member, rises in zip(classes, starts, strict=True):
             means = [0.0] * 6
             if member:
                 free = [t for t in member if not runs[t]] or member
                 means = [float(np.mean(a[member])) for a in (net, speed, off, runs)]
                 means += [float(np.mean(a[free])) for a in (net, off)]
             swing = [-np.inf, -np.inf]  # inside a block SOC is not limited
-            rows.append([float(len(member)), *means, -grid.rise_share * len(entries), *swing])
+            rows.append([float(len(member)), *means, rises, *swing])
         place_s = -(-steps // grid.blocks)
         kept_j = [0.0, 0.0]
         if seconds:
