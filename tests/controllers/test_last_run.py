@@ -27,6 +27,7 @@ def stages(
     now_w: float = DRIVING_W,
     then_w: float = DRIVING_W,
     soon_share: float = 0.0,
+    must_soon: float = 0.0,
 ) -> tuple[Stages, np.ndarray]:
     """Twenty seconds of driving and a minute to arrival, in which the plan takes some energy.
 
@@ -38,6 +39,7 @@ def stages(
     off_w = np.array([POLISH.internal_w(w) for w in net_w.tolist()])
     zero = np.zeros(SECONDS + 1)
     must = np.append(np.zeros(SECONDS), must_share)
+    must[SECONDS - 1] = must_soon
     trip = Stages(h, net_w, zero + 8.0, off_w, must, net_w, off_w, zero, zero, zero)
     taken_w = np.append(np.full(SECONDS, soon_share / SECONDS), (1.0 - soon_share) / 60.0)
     return trip, off_w - wanted_j * taken_w
@@ -106,12 +108,14 @@ def start_w(
     then_w=DRIVING_W,
     soon_share=0.8,
     must_share=0.0,
+    must_soon=0.0,
     prices=USUAL,
 ) -> float:
     """So many runs are wanted, each of what a shortest one gives now."""
     gives_j = car.engine.min_on_s * POLISH.going(prices, now_w, POLISH.internal_w(now_w)).gain_w
-    trip, internal_w = stages(runs * gives_j, must_share, now_w, then_w, soon_share)
-    return last_start_w(car.engine, POLISH, prices, trip, internal_w, SECONDS)
+    trip, internal_w = stages(runs * gives_j, must_share, now_w, then_w, soon_share, must_soon)
+    sigma = np.append(np.full(SECONDS, 0.3), 0.2)
+    return last_start_w(car.engine, POLISH, prices, trip, sigma, internal_w, SECONDS)
 
 
 @pytest.mark.parametrize(
@@ -134,37 +138,44 @@ def test_it_waits_for_better_seconds() -> None:
 
 
 def test_it_is_no_start_that_something_else_decides() -> None:
-    """Free starts, a second that has to run anyway, heat, an arrival nearer than a run lasts."""
+    """Free starts, a second soon that has to run, heat, an arrival nearer than a run lasts."""
     free = CAR.with_settings({"engine.start_fuel_g": 0.0, "engine.start_energy_j": 0.0})
     heating = USUAL._replace(fuel=0.4, internal=0.4 * USUAL.internal)
-    assert start_w(1.0, free) == start_w(1.0, must_share=0.05) == 0.0
+    assert start_w(1.0, free) == start_w(1.0, must_soon=1.0) == 0.0
     assert start_w(1.0, prices=heating) == 0.0
     assert start_w(1.0, CAR.with_settings({"engine.min_on_s": SECONDS + 1})) == 0.0
 
 
-SHORT = "random-7066-196s"
-SETTINGS = {
-    "thermal.t_amb_degc": -13.179993,
-    "trip.soc_init": 0.76634,
-    "trip.t_cl_init_degc": 66.25961,
+def test_what_later_seconds_give_that_have_to_run_is_no_reason() -> None:
+    """Half of what is wanted later, by a share of which a half, or all, has to run anyway."""
+    for must_share, least in ((0.0, 0.5), (0.1, 0.5 / 0.75), (0.2, 0.5 / 0.5)):
+        for runs, begins in ((1.01 * least, True), (0.99 * least, False)):
+            assert (start_w(runs, soon_share=0.5, must_share=must_share) > 0.0) is begins
+
+
+ROAD = "train-057"
+OF_ROAD = {
+    "thermal.t_amb_degc": -14.908427,
+    "trip.soc_init": 0.776437,
+    "trip.t_cl_init_degc": 74.1441,
 }
+SOC_G = 165.0  # of a unit of SOC on this trip, dynamic programming's
 
 
 def drive(made_in: str) -> Trajectory:
-    settings = {**SETTINGS, "mh_qp.implementation": made_in}
-    return qpmpc.simulate(SHORT, "mh-qp", vehicle="prius-liion", settings=settings).trajectory
+    settings = {**OF_ROAD, "mh_qp.implementation": made_in}
+    return qpmpc.simulate(ROAD, "mh-qp", vehicle="prius-liion", settings=settings).trajectory
 
 
 def test_a_start_before_the_arrival_is_spared(monkeypatch) -> None:
-    """Three minutes; without it the last run is one too many."""
+    """Two and a half minutes; without it the last run is one too many."""
     now = drive("python")
     monkeypatch.setattr("qpmpc.controllers.qp_planner.last_run_w", lambda *_: 0.0)
     before = drive("python")
     starts = [int(run.started.sum()) for run in (now, before)]
     assert starts[0] == starts[1] - 1
-    soc_g = 162.0  # of a unit of SOC on this trip, dynamic programming's
-    fuel_g = [run.fuel_g.sum() - soc_g * run.soc[-1] for run in (now, before)]
-    assert fuel_g[1] - fuel_g[0] > 1.5 * CAR.engine.start_fuel_g
+    fuel_g = [run.fuel_g.sum() - SOC_G * run.soc[-1] for run in (now, before)]
+    assert fuel_g[1] - fuel_g[0] > CAR.engine.start_fuel_g
 
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -174,32 +185,14 @@ def test_c_goes_on_as_python_does() -> None:
     np.testing.assert_allclose(runs[0].p_eng_w, runs[1].p_eng_w, rtol=1e-6, atol=1e-3)
 
 
-ROAD = "train-057"
-OF_ROAD = {
-    "thermal.t_amb_degc": -14.908427,
-    "trip.soc_init": 0.776437,
-    "trip.t_cl_init_degc": 74.1441,
-}
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(compiler() is None, reason="no C compiler")
 def test_the_last_run_begins_while_the_car_drives(monkeypatch) -> None:
-    """Without it the last start is at standstill before arrival; in C as in Python."""
-
-    def on_road(made_in: str) -> Trajectory:
-        settings = {**OF_ROAD, "mh_qp.implementation": made_in}
-        return qpmpc.simulate(ROAD, "mh-qp", vehicle="prius-liion", settings=settings).trajectory
-
-    now, in_c = on_road("python"), on_road("c")
+    """Without it the last start is at standstill before arrival."""
+    now = drive("python")
     monkeypatch.setattr("qpmpc.controllers.qp_planner.last_start_w", lambda *_: 0.0)
-    before = on_road("python")
-    np.testing.assert_array_equal(now.engine_on, in_c.engine_on)
-    np.testing.assert_allclose(now.p_eng_w, in_c.p_eng_w, rtol=1e-6, atol=1e-3)
+    before = drive("python")
     last = [int(np.flatnonzero(run.started)[-1]) for run in (now, before)]
     assert now.demand_w[last[0]] > 5e3 > before.demand_w[last[1]]
-    soc_g = 165.0  # of a unit of SOC on this trip, dynamic programming's
-    fuel_g = [run.fuel_g.sum() - soc_g * run.soc[-1] for run in (now, before)]
+    fuel_g = [run.fuel_g.sum() - SOC_G * run.soc[-1] for run in (now, before)]
     assert fuel_g[1] - fuel_g[0] > 1.5 * CAR.engine.start_fuel_g
 
 
