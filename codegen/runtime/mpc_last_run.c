@@ -8,11 +8,11 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-/* Energy that the plan takes from the engine. */
-static mpc_real wanted_j(const mpc_state *state)
+/* Energy that the plan takes from the engine in its first stages. */
+static mpc_real wanted_j(const mpc_state *state, int32_t stages)
 {
     mpc_real sum = REAL(0.0);
-    for (int32_t k = 0; k < MPC_STAGES; k++) {
+    for (int32_t k = 0; k < stages; k++) {
         const mpc_stage *const stage = &state->stage[k];
         const mpc_real taken_w = stage->road.internal_off_w - stage->x[MPC_VAR_INTERNAL];
         sum += stage->road.duration_s * taken_w;
@@ -20,26 +20,11 @@ static mpc_real wanted_j(const mpc_state *state)
     return sum;
 }
 
-/* Of that, what the seconds do not give that have to run anyway. */
-static mpc_real chosen_j(const mpc_state *state, int32_t stages)
-{
-    mpc_real sum = REAL(0.0);
-    for (int32_t k = 0; k < stages; k++) {
-        const mpc_stage *const stage = &state->stage[k];
-        const mpc_real taken_w = stage->road.internal_off_w - stage->x[MPC_VAR_INTERNAL];
-        const mpc_real share = real_max(stage->x[MPC_VAR_ON], LEAST_SHARE);
-        const mpc_real chosen = REAL(1.0) - real_min(stage->road.must_share / share, REAL(1.0));
-        sum += chosen * (stage->road.duration_s * taken_w);
-    }
-    return sum;
-}
-
-/* Whether energy decides: none of the first stages has to run anyway, and the plan does not want
- * heat. */
-static int32_t is_asked(const mpc_state *state, const mpc_prices *prices, int32_t stages)
+/* Whether energy decides: no second ahead has to run anyway, and the plan does not want heat. */
+static int32_t is_asked(const mpc_state *state, const mpc_prices *prices)
 {
     mpc_real must_s = REAL(0.0);
-    for (int32_t k = 0; k < stages; k++) {
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
         must_s += state->stage[k].road.duration_s * state->stage[k].road.must_share;
     }
     return ((mpc_par.polish != 0) && (must_s <= MUST_LEAST_S) && (prices->fuel >= FUEL_LEAST)) ? 1
@@ -48,7 +33,7 @@ static int32_t is_asked(const mpc_state *state, const mpc_prices *prices, int32_
 
 mpc_real mpc_last_run_w(const mpc_state *state, const mpc_prices *prices, const mpc_going *now)
 {
-    const mpc_real wanted_s = wanted_j(state) / real_max(now->gain_w, LEAST_GAIN_W);
+    const mpc_real wanted_s = wanted_j(state, MPC_STAGES) / real_max(now->gain_w, LEAST_GAIN_W);
     const mpc_real run_s = (mpc_real)mpc_par.min_on_s;
     const int32_t is_one_run = ((wanted_s >= (WANTED_LEAST * run_s)) && (wanted_s <= run_s)) ? 1
                                                                                              : 0;
@@ -57,8 +42,7 @@ mpc_real mpc_last_run_w(const mpc_state *state, const mpc_prices *prices, const 
             ? is_one_run
             : 0;
     const int32_t goes =
-        ((state->watch.good.engine_on != 0) && (is_asked(state, prices, MPC_STAGES) != 0)) ? pays
-                                                                                           : 0;
+        ((state->watch.good.engine_on != 0) && (is_asked(state, prices) != 0)) ? pays : 0;
     return (goes != 0) ? now->power_w : REAL(0.0);
 }
 
@@ -88,8 +72,8 @@ mpc_real mpc_last_start_w(const mpc_state *state, const mpc_prices *prices, cons
             best_g = real_min(best_g, goes_on_g);
         }
     }
-    const mpc_real all_j = chosen_j(state, MPC_STAGES);
-    const mpc_real soon_j = chosen_j(state, MPC_SHORT);
+    const mpc_real all_j = wanted_j(state, MPC_STAGES);
+    const mpc_real soon_j = wanted_j(state, MPC_SHORT);
     const int32_t is_one_run =
         ((all_j >= (START_LEAST * gives_j)) && (all_j <= (START_MOST * gives_j))) ? 1 : 0;
     const int32_t is_soon = (soon_j >= (START_SOON * all_j)) ? is_one_run : 0;
@@ -98,7 +82,6 @@ mpc_real mpc_last_start_w(const mpc_state *state, const mpc_prices *prices, cons
     const int32_t pays = ((now_g + best_g) <= -start_g) ? is_best : 0;
     const int32_t lasts = ((run_s > 0) && (lasts_s >= (mpc_real)run_s)) ? pays : 0;
     const int32_t begins =
-        ((state->watch.good.engine_on == 0) && (is_asked(state, prices, MPC_SHORT) != 0)) ? lasts
-                                                                                          : 0;
+        ((state->watch.good.engine_on == 0) && (is_asked(state, prices) != 0)) ? lasts : 0;
     return (begins != 0) ? second[0].power_w : REAL(0.0);
 }

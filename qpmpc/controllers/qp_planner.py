@@ -196,9 +196,7 @@ class QpPlanner(Planner):
                 going_w = last_run_w(engine, polish, prices, stages, internal_w)
                 least_w = max(least_w, going_w)
             else:
-                starts_w = last_start_w(
-                    engine, polish, prices, stages, x[:, Var.ON], internal_w, short.stop
-                )
+                starts_w = last_start_w(engine, polish, prices, stages, internal_w, short.stop)
                 early_w = short_run_w(engine, polish, prices, stages, on_share)
                 least_w = max(least_w, starts_w, early_w)
             heating_w = heating_run_w(vehicle, polish, prices, stages, x[:, Var.ON], seen)

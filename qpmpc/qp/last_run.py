@@ -17,7 +17,6 @@ from qpmpc.qp.polish import Going, Polish, Prices
 from qpmpc.qp.rows import table_of
 from qpmpc.vehicle.engine_parameters import Engine
 
-LEAST_SHARE = 1e-3  # of a stage: less counts as that
 LEAST_GAIN_W = 1000.0  # that the battery must gain while a run goes on, or it goes on for nothing
 WANTED_LEAST = 0.5  # of a shortest run: less than that the plan would never start the engine for
 FUEL_LEAST = 0.5  # g that a gram of fuel costs, its heat set off: below it the plan wants heat
@@ -60,8 +59,7 @@ def last_run_w(
     going = polish.going(prices, float(stages.net_w[0]), float(stages.internal_off_w[0]))
     if going.gain_w < LEAST_GAIN_W or prices.fuel < FUEL_LEAST:
         return 0.0
-    taken_w = stages.internal_off_w - internal_w
-    wanted_s = float((stages.duration_s * taken_w).sum()) / going.gain_w
+    wanted_s = wanted_j(stages, internal_w) / going.gain_w
     is_one_run = WANTED_LEAST * engine.min_on_s <= wanted_s <= engine.min_on_s
     pays = going.dearer_g_per_s * wanted_s <= engine.start_fuel_g
     return going.power_w if is_one_run and pays else 0.0
@@ -72,7 +70,6 @@ def last_start_w(
     polish: Polish,
     prices: Prices,
     stages: Stages,
-    on_share: NDArray[np.float64],
     internal_w: NDArray[np.float64],
     short_stages: int,
 ) -> float:
@@ -85,20 +82,17 @@ def last_start_w(
         D_0 + min(0, min_m sum of d_k over k = b .. m) <= -`START_PAYS` c
 
     if no other shortest run in the short horizon costs less, if W is about that run,
-    J / 2 <= W <= 3 J / 2, and if the plan wants half of W or more in the short horizon. W is less
-    what seconds give that have to run anyway, 1 - m_k / sigma_k of it in each stage; none of the
-    short horizon may. Neither where the plan wants heat nor where the trip ends sooner than the
-    run. To be asked while the engine rests.
+    J / 2 <= W <= 3 J / 2, if the plan wants half of W or more in the short horizon, and if no
+    second ahead has to run anyway. Neither where the plan wants heat nor where the trip ends sooner
+    than the run. To be asked while the engine rests.
 
     Parameters
     ----------
     engine, polish, prices, stages, internal_w : as of `last_run_w`
-    on_share : sigma, shape (n,)
     short_stages : how many stages are seconds
     """
     run_s = engine.min_on_s
-    soon_s = float(stages.must_share[:short_stages].sum())
-    asked = table_of(engine).has_start and soon_s <= MUST_LEAST_S
+    asked = table_of(engine).has_start and stages.must_s <= MUST_LEAST_S
     lasts = 0 < run_s <= len(stages.seconds_w(short_stages))
     if not asked or not lasts or prices.fuel < FUEL_LEAST:
         return 0.0
@@ -108,11 +102,10 @@ def last_start_w(
 
     run = [going(k) for k in range(run_s)]
     gives_j = sum(second.gain_w for second in run)
-    chosen = 1.0 - np.minimum(stages.must_share / np.maximum(on_share, LEAST_SHARE), 1.0)
-    chosen_j = chosen * stages.duration_s * (stages.internal_off_w - internal_w)
-    of_all_j, soon_j = float(chosen_j.sum()), float(chosen_j[:short_stages].sum())
+    of_all_j = wanted_j(stages, internal_w)
     is_one_run = START_LEAST * gives_j <= of_all_j <= START_MOST * gives_j
-    if not (is_one_run and soon_j >= START_SOON * of_all_j):
+    is_soon = wanted_j(stages, internal_w, short_stages) >= START_SOON * of_all_j
+    if not (is_one_run and is_soon):
         return 0.0
     seconds = [*run, *(going(k) for k in range(run_s, short_stages))]
     dearer_g = stages.duration_s[:short_stages] * [second.dearer_g_per_s for second in seconds]
@@ -120,3 +113,11 @@ def last_start_w(
     goes_on_g = np.cumsum(dearer_g[run_s:]).min(initial=0.0)
     pays = runs_g[0] + goes_on_g <= -START_PAYS * engine.start_fuel_g
     return run[0].power_w if pays and runs_g[0] <= runs_g.min() + SAME_G else 0.0
+
+
+def wanted_j(
+    stages: Stages, internal_w: NDArray[np.float64], first_stages: int | None = None
+) -> float:
+    """Return the energy that the plan takes from the engine, in all or its first stages."""
+    taken_w = (stages.internal_off_w - internal_w)[:first_stages]
+    return float((stages.duration_s[:first_stages] * taken_w).sum())

@@ -27,7 +27,6 @@ def stages(
     now_w: float = DRIVING_W,
     then_w: float = DRIVING_W,
     soon_share: float = 0.0,
-    must_soon: float = 0.0,
 ) -> tuple[Stages, np.ndarray]:
     """Twenty seconds of driving and a minute to arrival, in which the plan takes some energy.
 
@@ -39,7 +38,6 @@ def stages(
     off_w = np.array([POLISH.internal_w(w) for w in net_w.tolist()])
     zero = np.zeros(SECONDS + 1)
     must = np.append(np.zeros(SECONDS), must_share)
-    must[SECONDS - 1] = must_soon
     trip = Stages(h, net_w, zero + 8.0, off_w, must, net_w, off_w, zero, zero, zero)
     taken_w = np.append(np.full(SECONDS, soon_share / SECONDS), (1.0 - soon_share) / 60.0)
     return trip, off_w - wanted_j * taken_w
@@ -108,14 +106,12 @@ def start_w(
     then_w=DRIVING_W,
     soon_share=0.8,
     must_share=0.0,
-    must_soon=0.0,
     prices=USUAL,
 ) -> float:
     """So many runs are wanted, each of what a shortest one gives now."""
     gives_j = car.engine.min_on_s * POLISH.going(prices, now_w, POLISH.internal_w(now_w)).gain_w
-    trip, internal_w = stages(runs * gives_j, must_share, now_w, then_w, soon_share, must_soon)
-    sigma = np.append(np.full(SECONDS, 0.3), 0.2)
-    return last_start_w(car.engine, POLISH, prices, trip, sigma, internal_w, SECONDS)
+    trip, internal_w = stages(runs * gives_j, must_share, now_w, then_w, soon_share)
+    return last_start_w(car.engine, POLISH, prices, trip, internal_w, SECONDS)
 
 
 @pytest.mark.parametrize(
@@ -138,19 +134,12 @@ def test_it_waits_for_better_seconds() -> None:
 
 
 def test_it_is_no_start_that_something_else_decides() -> None:
-    """Free starts, a second soon that has to run, heat, an arrival nearer than a run lasts."""
+    """Free starts, a second that has to run anyway, heat, an arrival nearer than a run lasts."""
     free = CAR.with_settings({"engine.start_fuel_g": 0.0, "engine.start_energy_j": 0.0})
     heating = USUAL._replace(fuel=0.4, internal=0.4 * USUAL.internal)
-    assert start_w(1.0, free) == start_w(1.0, must_soon=1.0) == 0.0
+    assert start_w(1.0, free) == start_w(1.0, must_share=0.05) == 0.0
     assert start_w(1.0, prices=heating) == 0.0
     assert start_w(1.0, CAR.with_settings({"engine.min_on_s": SECONDS + 1})) == 0.0
-
-
-def test_what_later_seconds_give_that_have_to_run_is_no_reason() -> None:
-    """Half of what is wanted later, by a share of which a half, or all, has to run anyway."""
-    for must_share, least in ((0.0, 0.5), (0.1, 0.5 / 0.75), (0.2, 0.5 / 0.5)):
-        for runs, begins in ((1.01 * least, True), (0.99 * least, False)):
-            assert (start_w(runs, soon_share=0.5, must_share=must_share) > 0.0) is begins
 
 
 ROAD = "train-057"
