@@ -36,7 +36,7 @@ class MhCostateSettings(BaseModel):
 
     Attributes
     ----------
-    horizon : layout of the stages, as of `mh_qp`, without `entry_share`: blocks are apart
+    horizon : layout of the stages, as of `mh_qp`, but `entry_share` is 0: blocks are apart
     limits : terminal band and margins, as of `mh_qp.qp`; it comes nearer to a limit than an
         iteration that is stopped, and needs less of a margin to it
     rounds : Newton rounds of a second
@@ -54,7 +54,9 @@ class MhCostateSettings(BaseModel):
     @classmethod
     def _apart(cls, horizon: HorizonSettings) -> HorizonSettings:
         if horizon.entry_share:
-            raise ValueError("entry_share must be 0: its blocks share prices alone")
+            raise ValueError(
+                "entry_share must be 0, not as of mh_qp: its blocks share prices alone"
+            )
         return horizon
 
 

@@ -37,7 +37,8 @@ def short_run_w(
               less the sum of c_k over k = s .. f - 1
 
     It begins now if G_0 is greater than all others and than 0, by more than rounding. Not where the
-    trip ends before second f + b, nor where the plan wants heat. To be asked while it rests.
+    seconds ahead end before f + b, nor where the plan wants heat. That the plan may run the engine
+    again right behind is not counted. To be asked while it rests.
 
     Parameters
     ----------

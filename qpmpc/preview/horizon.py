@@ -28,8 +28,8 @@ class HorizonSettings(BaseModel):
         limits at the end of a block are tightened, see `qpmpc.preview.swing`
     rise_share : starts that a block costs, per rise of its demand into a class and per on-share
         there. Less than 1: an engine that runs in part of a class does so in its longest episodes
-    entry_share : starts that a block costs, per on-share there that is more than at the end of the
-        block before; as much less of its first rise counts
+    entry_share : starts that a block costs, per on-share of its first class that is more than at
+        the end of the block before; of its rises into each class as much less counts
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)

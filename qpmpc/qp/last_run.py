@@ -81,10 +81,11 @@ def last_start_w(
 
         D_0 + min(0, min_m sum of d_k over k = b .. m) <= -`START_PAYS` c
 
-    if no other shortest run in the short horizon costs less, if W is about that run,
-    J / 2 <= W <= 3 J / 2, if the plan wants half of W or more in the short horizon, and if no
-    second ahead has to run anyway. Neither where the plan wants heat nor where the trip ends sooner
-    than the run. To be asked while the engine rests.
+    which is what a plan of shares pays for the part of a start that it makes (such a run may give
+    more than W: chosen by measurement), if no other shortest run in the short horizon costs less,
+    if W is about that run, J / 2 <= W <= 3 J / 2, if the plan wants half of W or more in the short
+    horizon, and if no second ahead has to run anyway. Neither where the plan wants heat nor where
+    the trip ends sooner than the run. To be asked while the engine rests.
 
     Parameters
     ----------

@@ -122,6 +122,18 @@ def test_it_begins_where_a_shortest_run_pays_for_its_start(runs, begins) -> None
     assert start_w(runs) == (RUN[0].power_w if begins else 0.0)
 
 
+@pytest.mark.parametrize(("of_start", "begins"), [(1.01, True), (0.99, False)])
+def test_it_pays_as_long_as_it_best_lasts(of_start, begins) -> None:
+    """Ten seconds of it, then slow driving, for 0.85 of a start; four alone do not pay for one."""
+    second = POLISH.going(USUAL, 10e3, POLISH.internal_w(10e3))
+    slow = POLISH.going(USUAL, DRIVING_W, POLISH.internal_w(DRIVING_W))
+    assert second.dearer_g_per_s < 0.0 < slow.dearer_g_per_s
+    fuel_g = -10.0 * second.dearer_g_per_s / (0.85 * of_start)
+    car = CAR.with_settings({"engine.start_fuel_g": fuel_g})
+    assert -4.0 * second.dearer_g_per_s < 0.5 * fuel_g
+    assert (start_w(1.0, car, now_w=10e3) > 0.0) is begins
+
+
 def test_it_waits_for_better_seconds() -> None:
     """Slow driving does not pay for a start; what the plan wants later, it may get at less cost."""
     easy = POLISH.going(USUAL, DRIVING_W, POLISH.internal_w(DRIVING_W))

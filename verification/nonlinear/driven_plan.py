@@ -75,7 +75,7 @@ class PlanDriver:
             x[[NlpVar.SOC, NlpVar.T_CL]] = state
             x[NlpVar.ON] = sigma = float(np.clip(on_share[k], SIGMA_LEAST, 1.0))
             x[NlpVar.ABOVE] = np.clip(power_w[k] / sigma, least_w, most_w) * sigma - least_w * sigma
-            starts = rises * max(sigma - before, 0.0)
+            starts = max(rises * (sigma - before), 0.0)
             if problem.count > NlpVar.START:
                 x[NlpVar.START] = starts
             stage_g = self._stage(
