@@ -49,7 +49,7 @@ static mpc_real rises_of(const mpc_state *state, const mpc_in *in, int32_t k)
     const mpc_real rises = (k > begins) ? (in->long_rises[k - 1] - mpc_par.entry_share) : REAL(0.0);
     const mpc_real falls = state->cal.rise_share * real_max(rises, REAL(0.0));
     const mpc_real enters = (MPC_CLASSES > 1) ? mpc_par.entry_share : REAL(0.0);
-    return (inside != 0) ? -falls : enters;
+    return ((inside != 0) || (enters <= REAL(0.0))) ? -falls : enters;
 }
 
 /* Preview to stages: seconds first, then the classes of each block; past stages are masked. */

@@ -354,7 +354,8 @@ def starts_per_rise(
         r = -rise_share max(rises - kappa, 0)   from one class that the block has to the next,
         r = kappa                               from the block before to the first that it has
 
-    and from there to those beside them that it has not, which so hand its last on-share on.
+    and from there to those beside them that it has not, which so hand its last on-share on. Where
+    kappa is 0 nothing is handed on, and all classes but the first are as the first line has it.
     """
     classes, entry = settings.classes, settings.entry_share
     of_stage = np.zeros_like(rises).reshape(-1, classes)
@@ -365,5 +366,6 @@ def starts_per_rise(
     to_last = np.logical_or.accumulate(has[:, ::-1], axis=1)[:, -2::-1]
     falls = settings.rise_share * np.maximum(rises.reshape(-1, classes)[:, :-1] - entry, 0.0)
     of_stage[:, 0] = entry
-    of_stage[:, 1:] = np.where(from_first & to_last, -falls, entry)
+    inside = (from_first & to_last) | (entry == 0.0)
+    of_stage[:, 1:] = np.where(inside, -falls, entry)
     return of_stage.ravel()
