@@ -19,6 +19,8 @@ _STATUS = {
 }
 EQUALITY = 5
 PROXIMAL_WEIGHT = 1e-4  # makes the Hessian definite; fewest outer iterations on recorded problems
+CYCLES = 100  # steps without progress after which it gives up; its own 10 is too few where rows of
+# stages that have no second are degenerate
 
 
 class Daqp(TimedSolver):
@@ -43,6 +45,7 @@ class Daqp(TimedSolver):
             "eta_prox": self.tolerance,
             "eps_prox": PROXIMAL_WEIGHT,
             "iter_limit": self.limit,
+            "cycle_tol": CYCLES,
         }
         self._solver.setup(*self._values(data), sense=self._sense())
 
