@@ -44,7 +44,7 @@ OF_BUDGET = "The sizes are the controller's budget: a build that\n * does not fi
 # Files of the runtime that one method alone has; those of costates by their beginnings.
 OF_ADMM = {"mpc_admm.c", "mpc_admm.h"}
 OF_COSTATE = ("mpc_costate", "mpc_elementary")
-OF_STARTS = {"mpc_last_run.c", "mpc_short_run.c"}  # if one costs anything
+OF_STARTS = {"mpc_battery_run.c", "mpc_last_run.c", "mpc_short_run.c"}  # if one costs anything
 OF_QP = OF_STARTS | {
     "mpc_qp.c",
     "mpc_qp_method.c",

@@ -51,6 +51,12 @@ mpc_real mpc_map_power_to_reach_w(mpc_real soc, mpc_real soc_end)
     return current * (voltage - (resistance * current));
 }
 
+/* Energy of a full battery at the open-circuit voltage of an SOC. */
+mpc_real mpc_map_energy_j(mpc_real soc)
+{
+    return at_soc(mpc_par.open_circuit_v, soc) * mpc_par.charge_c;
+}
+
 /* Most power that the battery accepts: its limit, or what just fills it to soc_max in a second. */
 mpc_real mpc_map_charge_limit_w(mpc_real soc, mpc_real soc_max)
 {

@@ -28,6 +28,7 @@ typedef struct {
 mpc_real mpc_map_fuel_g_per_s(mpc_real p_eng_w);
 mpc_real mpc_map_cold_factor(mpc_real t_cl_degc);
 mpc_real mpc_map_charge_limit_w(mpc_real soc, mpc_real soc_max);
+mpc_real mpc_map_energy_j(mpc_real soc);
 mpc_real mpc_map_power_to_reach_w(mpc_real soc, mpc_real soc_end);
 mpc_real mpc_map_current_a(mpc_real soc, mpc_real power_w);
 mpc_real mpc_map_planned_internal_w(mpc_real power_w);
@@ -74,13 +75,15 @@ mpc_going mpc_polish_going(const mpc_state *state, const mpc_prices *prices, int
 /* Where the coming second runs beside the plan, at its least-cost power power_w (mpc_polish.c); 0
  * elsewhere. mpc_empty_battery.c: where the battery or the ramp needs the engine, with the ramp's power
  * at least. mpc_last_run.c: where a run goes on for all that the plan still wants, or begins for it in
- * time. mpc_short_run.c: where one that is shorter than it may be begins before its time. Both of the
+ * time. mpc_battery_run.c: where one goes on or begins for what the battery lacks in the seconds ahead.
+ * mpc_short_run.c: where one that is shorter than it may be begins before its time. These three of the
  * seconds of the short horizon with the engine on. mpc_heating_run.c: where a run goes on for the heat
  * that the coolant lacks, or one second gives all of it. */
 mpc_real mpc_empty_battery_w(const mpc_state *state, mpc_real power_w, mpc_real ramp_w);
 mpc_real mpc_last_run_w(const mpc_state *state, const mpc_prices *prices, const mpc_going *now);
 mpc_real mpc_last_start_w(const mpc_state *state, const mpc_prices *prices,
                           const mpc_going *second);
+mpc_real mpc_battery_run_w(const mpc_state *state, const mpc_going *second);
 mpc_real mpc_short_run_w(const mpc_state *state, const mpc_prices *prices, const mpc_going *second);
 mpc_real mpc_heating_run_w(const mpc_state *state, const mpc_prices *prices, mpc_real power_w);
 

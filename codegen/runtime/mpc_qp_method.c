@@ -95,6 +95,7 @@ mpc_real mpc_method_least_w(const mpc_state *state)
     least_w = real_max(least_w, mpc_last_run_w(state, &prices, &second[0]));
     least_w = real_max(least_w, mpc_last_start_w(state, &prices, second));
     least_w = real_max(least_w, mpc_short_run_w(state, &prices, second));
+    least_w = real_max(least_w, mpc_battery_run_w(state, second));
 #endif
     return real_max(least_w, mpc_heating_run_w(state, &prices, power_w));
 }

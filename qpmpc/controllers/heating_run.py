@@ -53,7 +53,8 @@ def heating_run_w(
     with T_n = T_cl,min + `T_CL_MARGIN_K`, which the safety layer keeps, and lacks J = C (T_0 - T).
     It loses more the warmer it is: by the losses at the limit three minutes from 44 degC would seem
     to end 0.2 K warmer. Nothing is done unless J > 0, the plan wants no whole run,
-    sum_k h_k sigma_k <= b, the shortest one or 1 s, and no second ahead has to run anyway.
+    sum_k h_k sigma_k <= b, the shortest one or 1 s, and no second ahead has to run anyway, but the
+    last of a shortest run that is under way.
 
     With m and Q the fuel and the heat of the coming second at its least-cost power E, and c the
     fuel of a start, a run whose start cost something goes on at E if that burns no more than one
@@ -78,7 +79,9 @@ def heating_run_w(
     run_s, wanted_s = max(engine.min_on_s, 1), (stages.duration_s * np.maximum(on_share, 0.0)).sum()
     limit_degc = thermal.t_cl_min_degc + T_CL_MARGIN_K
     lack_j = thermal.heat_capacity_j_per_k * (_lasts_from_degc(thermal, stages) - t_cl_degc)
-    if lack_j <= 0.0 or stages.must_s > MUST_LEAST_S or wanted_s > run_s:
+    held_s = max(run_s - seen.engine_for_s, 0) if seen.engine_on else 0
+    decides = held_s <= 1 and stages.must_s - held_s <= MUST_LEAST_S and wanted_s <= run_s
+    if lack_j <= 0.0 or not decides:
         return 0.0
     hot_w = alpha_at(vehicle.cold_engine, t_cl_degc) * engine.lhv_j_per_g
     net_w, off_w = float(stages.net_w[0]), float(stages.internal_off_w[0])

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from qpmpc.controllers.battery_run import battery_run_w
 from qpmpc.controllers.empty_battery import empty_battery_w
 from qpmpc.controllers.heating_run import heating_run_w
 from qpmpc.controllers.monitor import Flag
@@ -199,8 +200,9 @@ class QpPlanner(Planner):
                 starts_w = last_start_w(engine, polish, prices, stages, internal_w, short.stop)
                 early_w = short_run_w(engine, polish, prices, stages, on_share)
                 least_w = max(least_w, starts_w, early_w)
+            battery_w = battery_run_w(vehicle, polish, prices, stages, on_share, seen)
             heating_w = heating_run_w(vehicle, polish, prices, stages, x[:, Var.ON], seen)
-            least_w = max(least_w, heating_w)
+            least_w = max(least_w, battery_w, heating_w)
         return Plan(
             on_share,
             power_w,

@@ -49,7 +49,7 @@ def engine_runs(
     arrival_s : seconds until the trip ends; None where that is beyond the plan
     seen : the present
     vehicle : gives b
-    least_w : engine power that ramp, empty battery or a run that goes on ask for now, see
+    least_w : engine power that ramp, battery, or a run that begins or goes on ask for now, see
         `Plan.least_w`
     fast_s : seconds until the first that is too fast for an engine that is off; None without one
     stay_share : share from which on a run may go on; `STAY_SHARE` where only a start lets one rise

@@ -42,8 +42,9 @@ class Plan:
     iterations : taken by the solver
     relaxation_gap : slack of the relaxation at the first second, relative; nan if there is none
     arrival_s : second of the plan in which the trip ends; None where it ends later
-    least_w : engine power that the first second needs at least, see `ramp`, `empty_battery`
-        and `heating_run` in `qpmpc.controllers`, `last_run` in `qpmpc.qp`
+    least_w : engine power that the first second needs at least, see `ramp`, `empty_battery`,
+        `battery_run`, `short_run` and `heating_run` in `qpmpc.controllers`, `last_run` in
+        `qpmpc.qp`
     certificate_g : cost of the plan less a proven lower bound on that of any; nan without one
     fast_s : first second of the plan that is too fast for an engine that is off; None without one
     stay_share : share from which on a run may go on, see `qpmpc.controllers.realise`: `STAY_SHARE`

@@ -71,6 +71,9 @@ def test_a_plan_at_the_lower_limit_starts_no_engine_for_a_few_watts(monkeypatch)
         return min(float(power_w[begin : begin + 4].mean()) for begin in begins)
 
     assert least_of_runs_w() > POOR_W
+    # a run in good time for what the battery lacks would hide it: test_battery_run.py
+    monkeypatch.setattr("qpmpc.controllers.qp_planner.battery_run_w", lambda *_: 0.0)
+    assert least_of_runs_w() > POOR_W
     monkeypatch.setattr("qpmpc.qp.rows.SOC_KEPT", 0.0)
     assert least_of_runs_w() < 100.0
 

@@ -41,6 +41,7 @@ def power_w(
     demand_w: float = DRIVING_W,
     before_w: float = 20e3,
     polish: Polish | None = None,
+    for_s: int = 9,
 ) -> float:
     """So many seconds before arrival, after a second at some power."""
     blocks = int((left_s - 1) // BLOCK_S)
@@ -48,9 +49,10 @@ def power_w(
     n, polish = len(h), polish or POLISH[car]
     off = np.full(n, polish.internal_w(demand_w))
     net_w, zero = np.full(n, demand_w), np.zeros(n)
-    must = np.append(0.0, np.full(n - 1, must_share))
+    held_s = max(car.engine.min_on_s - for_s, 0) if engine_on else 0  # here: 1, 2 or none
+    must = np.append(float(held_s > 0), np.full(n - 1, must_share))
     trip = Stages(h, net_w, zero + SPEED_MPS, off, must, net_w, off, zero, zero, zero)
-    seen = Observation(9, 0.6, t_cl_degc, engine_on, demand_w, SPEED_MPS, 9, before_w)
+    seen = Observation(9, 0.6, t_cl_degc, engine_on, demand_w, SPEED_MPS, for_s, before_w)
     return heating_run_w(car, polish, prices, trip, np.full(n, on_share), seen)
 
 
@@ -123,6 +125,21 @@ def test_the_second_that_ends_it_gives_what_is_missing(lack_share: float) -> Non
     assert POLISH[CAR].power_w(POOR, DRIVING_W, 0.0) == 0.0 < p_w
     # alpha of 40.5 instead of 40.8 degC, and what the coolant loses meanwhile
     assert heats_k(CAR, p_w) == pytest.approx(lack_k + BEYOND_K, rel=0.01)
+
+
+def test_the_last_second_of_a_shortest_run_gives_what_is_missing() -> None:
+    """Four seconds for heat: `judge-031` idled a fifth for a few joules that they left.
+
+    The second has to run anyway; another that does, ahead, decides instead.
+    """
+    lacking = lasts_from_degc() - 1.3 * heats_k(CAR, 0.0)
+    gives_w, last_s = power_w(lacking, prices=POOR), CAR.engine.min_on_s - 1
+    assert power_w(lacking, prices=POOR, for_s=last_s) == gives_w > 100.0
+    assert power_w(lacking, prices=POOR, for_s=last_s - 1) == 0.0
+    assert power_w(lacking, prices=POOR, for_s=last_s, must_share=0.1) == 0.0
+    rests = {"prices": POOR, "engine_on": False}  # a rest of two seconds holds nothing
+    cold = CAR.thermal.t_cl_min_degc + T_CL_MARGIN_K + 1e-4
+    assert power_w(cold - 0.01, for_s=2, **rests) == power_w(cold - 0.01, **rests)
 
 
 def test_not_where_two_seconds_at_least_cost_are_cheaper() -> None:
