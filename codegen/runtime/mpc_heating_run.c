@@ -7,6 +7,7 @@
 #include "mpc_heat.h"
 #include "mpc_learned.h"
 #include "mpc_model.h"
+#include "mpc_must_run.h"
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
@@ -64,9 +65,8 @@ mpc_real mpc_heating_run_w(const mpc_state *state, const mpc_prices *prices, mpc
         must_s += road->duration_s * road->must_share;
         wanted_s += road->duration_s * real_max(state->stage[k].x[MPC_VAR_ON], REAL(0.0));
     }
-    const mpc_real ran_s = (mpc_real)state->watch.good.engine_for_s;
-    const mpc_real held_s = (state->watch.good.engine_on != 0) ? real_max(run_s - ran_s, REAL(0.0))
-                                                               : REAL(0.0);
+    const mpc_measured *const good = &state->watch.good;
+    const mpc_real held_s = (mpc_real)begun_s(good->engine_on, good->engine_for_s);
     const mpc_real lack_j = mpc_par.heat_capacity_j_per_k * (lasts_degc - t_cl_degc);
     const int32_t is_lacking = ((lack_j > REAL(0.0)) && (wanted_s <= run_s) && (held_s <= REAL(1.0))
                                 && ((must_s - held_s) <= MUST_LEAST_S))

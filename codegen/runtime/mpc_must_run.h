@@ -17,4 +17,11 @@ static inline int32_t must_run(mpc_real net_w, mpc_real speed_mps)
     return ((net_w > mpc_par.battery_discharge_max_w) ? 1 : 0) | is_too_fast(speed_mps);
 }
 
+/* For how many seconds a run of the engine that has begun has to go on. */
+static inline int32_t begun_s(int32_t engine_on, int32_t engine_for_s)
+{
+    const int32_t left_s = mpc_par.min_on_s - engine_for_s;
+    return ((engine_on != 0) && (left_s > 0)) ? left_s : 0;
+}
+
 #endif

@@ -23,12 +23,6 @@ static void take_refill(mpc_state *state)
     }
 }
 
-/* For how many seconds a run of the engine that has begun has to go on. */
-static int32_t begun_s(const mpc_measured *good)
-{
-    return (good->engine_on != 0) ? (mpc_par.min_on_s - good->engine_for_s) : 0;
-}
-
 /* Whether a block has seconds of the classes from one stage up to another. */
 static int32_t has(const mpc_in *in, int32_t from, int32_t to)
 {
@@ -55,7 +49,7 @@ static mpc_real rises_of(const mpc_state *state, const mpc_in *in, int32_t k)
 /* Preview to stages: seconds first, then the classes of each block; past stages are masked. */
 void mpc_stages_take(mpc_state *state, const mpc_in *in)
 {
-    const int32_t left_s = begun_s(&state->watch.good);
+    const int32_t left_s = begun_s(state->watch.good.engine_on, state->watch.good.engine_for_s);
     const int32_t held_s = (left_s < in->short_count) ? left_s : in->short_count;
     for (int32_t k = 0; k < MPC_SHORT; k++) {
         mpc_stage *const stage = &state->stage[k];
@@ -95,7 +89,7 @@ void mpc_stages_take(mpc_state *state, const mpc_in *in)
 /* The last good preview, some seconds later: short stages move up and are masked at the end. */
 void mpc_stages_move_up(mpc_state *state, int32_t by)
 {
-    const int32_t left_s = begun_s(&state->watch.good);
+    const int32_t left_s = begun_s(state->watch.good.engine_on, state->watch.good.engine_for_s);
     for (int32_t k = 0; k < MPC_SHORT; k++) {
         const int32_t from = k + by;
         mpc_stage_road *const road = &state->stage[k].road;

@@ -14,7 +14,7 @@ from qpmpc.controllers.realise import ON_THRESHOLD
 from qpmpc.controllers.safety import SOC_MARGIN
 from qpmpc.preview.stages import Stages
 from qpmpc.qp.last_run import SAME_G
-from qpmpc.qp.polish import Going, Polish, Prices
+from qpmpc.qp.polish import Polish, Prices
 from qpmpc.qp.rows import table_of
 from qpmpc.trip import Observation
 from qpmpc.vehicle.parameters import Vehicle
@@ -65,16 +65,14 @@ def battery_run_w(
     if lack_j <= 0.0:
         return 0.0
 
-    def going(k: int) -> Going:
-        return polish.going(prices, float(stages.net_w[k]), float(stages.internal_off_w[k]))
-
-    now = going(0)
+    now = polish.going_in(prices, stages, 0)
     if seen.engine_on:
         pays = now.dearer_g_per_s * lack_j <= engine.start_fuel_g * now.gain_w
         return now.power_w if pays else 0.0
     run_s, begins_by = max(engine.min_on_s, 1), int(np.argmax(lacks_j > 0.0))
     if len(stages.seconds_w(seconds)) < run_s:
         return 0.0
-    runs_g = np.convolve([going(k).dearer_g_per_s for k in range(seconds)], np.ones(run_s), "valid")
+    dearer_g = [polish.going_in(prices, stages, k).dearer_g_per_s for k in range(seconds)]
+    runs_g = np.convolve(dearer_g, np.ones(run_s), "valid")
     later_g = runs_g[1 : begins_by + 1][h[run_s : begins_by + run_s] > 0.0]
     return now.power_w if runs_g[0] + SAME_G <= later_g.min(initial=np.inf) else 0.0

@@ -20,6 +20,7 @@ from qpmpc.qp.rows import table_of
 from qpmpc.trip import Observation
 from qpmpc.vehicle.engine import alpha_at
 from qpmpc.vehicle.heat import cooling_w, engine_w
+from qpmpc.vehicle.must_run import begun_s
 from qpmpc.vehicle.parameters import Thermal, Vehicle
 from qpmpc.vehicle.section import STEP_S
 
@@ -79,7 +80,7 @@ def heating_run_w(
     run_s, wanted_s = max(engine.min_on_s, 1), (stages.duration_s * np.maximum(on_share, 0.0)).sum()
     limit_degc = thermal.t_cl_min_degc + T_CL_MARGIN_K
     lack_j = thermal.heat_capacity_j_per_k * (_lasts_from_degc(thermal, stages) - t_cl_degc)
-    held_s = max(run_s - seen.engine_for_s, 0) if seen.engine_on else 0
+    held_s = begun_s(vehicle, seen.engine_on, seen.engine_for_s)
     decides = held_s <= 1 and stages.must_s - held_s <= MUST_LEAST_S and wanted_s <= run_s
     if lack_j <= 0.0 or not decides:
         return 0.0

@@ -57,10 +57,7 @@ def short_run_w(
     is_started = np.clip(on_share[first:end], 0.0, 1.0).mean() >= ON_THRESHOLD
     if not is_started and stages.must_share[first] < ON_THRESHOLD:
         return 0.0
-    seconds = [
-        polish.going(prices, float(stages.net_w[k]), float(stages.internal_off_w[k]))
-        for k in range(end)
-    ]
+    seconds = [polish.going_in(prices, stages, k) for k in range(end)]
     costs_g = np.maximum([second.dearer_g_per_s for second in seconds], 0.0)
     spared_g = np.where(runs[:end], 0.0, costs_g)
     # G_s - G_s+1, from s = f - 1 down to now; G_f = 0

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.preview.stages import Stages
-from qpmpc.qp.polish import Going, Polish, Prices
+from qpmpc.qp.polish import Polish, Prices
 from qpmpc.qp.rows import table_of
 from qpmpc.vehicle.engine_parameters import Engine
 
@@ -56,7 +56,7 @@ def last_run_w(
     """
     if not table_of(engine).has_start or stages.must_s > MUST_LEAST_S:
         return 0.0
-    going = polish.going(prices, float(stages.net_w[0]), float(stages.internal_off_w[0]))
+    going = polish.going_in(prices, stages, 0)
     if going.gain_w < LEAST_GAIN_W or prices.fuel < FUEL_LEAST:
         return 0.0
     wanted_s = wanted_j(stages, internal_w) / going.gain_w
@@ -98,18 +98,15 @@ def last_start_w(
     if not asked or not lasts or prices.fuel < FUEL_LEAST:
         return 0.0
 
-    def going(k: int) -> Going:
-        return polish.going(prices, float(stages.net_w[k]), float(stages.internal_off_w[k]))
-
-    run = [going(k) for k in range(run_s)]
+    run = [polish.going_in(prices, stages, k) for k in range(run_s)]
     gives_j = sum(second.gain_w for second in run)
     of_all_j = wanted_j(stages, internal_w)
     is_one_run = START_LEAST * gives_j <= of_all_j <= START_MOST * gives_j
     is_soon = wanted_j(stages, internal_w, short_stages) >= START_SOON * of_all_j
     if not (is_one_run and is_soon):
         return 0.0
-    seconds = [*run, *(going(k) for k in range(run_s, short_stages))]
-    dearer_g = stages.duration_s[:short_stages] * [second.dearer_g_per_s for second in seconds]
+    rest = [polish.going_in(prices, stages, k) for k in range(run_s, short_stages)]
+    dearer_g = stages.duration_s[:short_stages] * [second.dearer_g_per_s for second in run + rest]
     runs_g = np.convolve(dearer_g, np.ones(run_s), "valid")
     goes_on_g = np.cumsum(dearer_g[run_s:]).min(initial=0.0)
     pays = runs_g[0] + goes_on_g <= -START_PAYS * engine.start_fuel_g

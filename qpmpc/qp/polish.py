@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from qpmpc.preview.stages import Stages
 from qpmpc.pwa.fit import PwaFit
 from qpmpc.pwa.model import PwaModel
 from qpmpc.vehicle.battery import BatteryMaps
@@ -109,3 +110,7 @@ class Polish:
         gain_w = off_w - self.internal_w(net_w - power_w)
         spent = prices.fuel * float(self.fuel(power_w)) + prices.p_eng * power_w
         return Going(power_w, gain_w, spent - prices.internal * gain_w)
+
+    def going_in(self, prices: Prices, stages: Stages, k: int) -> Going:
+        """Return the k-th of the coming seconds."""
+        return self.going(prices, float(stages.net_w[k]), float(stages.internal_off_w[k]))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from short_trip import assert_same_commands, drive_in
 
 import qpmpc
 from qpmpc.codegen.c_compiler import compiler
@@ -162,8 +163,7 @@ OF_ROAD = {
 
 
 def drive(made_in: str) -> Trajectory:
-    settings = {**OF_ROAD, "mh_qp.implementation": made_in}
-    return qpmpc.simulate(ROAD, "mh-qp", vehicle="prius-liion", settings=settings).trajectory
+    return drive_in(made_in, ROAD, "prius-liion", OF_ROAD)
 
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -172,8 +172,7 @@ def test_it_spares_starts_just_before_braking_in_c_as_in_python(monkeypatch) -> 
     now, in_c = drive("python"), drive("c")
     monkeypatch.setattr("qpmpc.controllers.qp_planner.battery_run_w", lambda *_: 0.0)
     before = drive("python")
-    np.testing.assert_array_equal(now.engine_on, in_c.engine_on)
-    np.testing.assert_allclose(now.p_eng_w, in_c.p_eng_w, rtol=1e-6, atol=1e-3)
+    assert_same_commands(now, in_c)
     assert now.started.sum() <= before.started.sum() - 2
     soc_g = 129.0  # of a unit of SOC: dynamic programming's own on this trip
     fuel_g = [run.fuel_g.sum() - soc_g * (run.soc[-1] - run.soc[0]) for run in (now, before)]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from short_trip import assert_same_commands, drive_in
 
 import qpmpc
 from qpmpc.codegen.c_compiler import compiler
@@ -40,9 +41,7 @@ def test_it_empties_where_the_plant_ends_below_the_limit(above: float, demand_w:
 
 
 def drive(made_in: str) -> Trajectory:
-    settings = {**LOW, "mh_qp.implementation": made_in}
-    trip = "random-8111-160s"
-    return qpmpc.simulate(trip, "mh-qp", vehicle="paper-liion", settings=settings).trajectory
+    return drive_in(made_in, "random-8111-160s", "paper-liion", LOW)
 
 
 def test_no_second_at_the_limit_is_driven_at_a_poor_power(monkeypatch) -> None:
@@ -81,5 +80,4 @@ def test_a_plan_at_the_lower_limit_starts_no_engine_for_a_few_watts(monkeypatch)
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 def test_c_runs_as_python_does() -> None:
     runs = [drive(made_in) for made_in in ("python", "c")]
-    np.testing.assert_array_equal(runs[0].engine_on, runs[1].engine_on)
-    np.testing.assert_allclose(runs[0].p_eng_w, runs[1].p_eng_w, rtol=1e-6, atol=1e-3)
+    assert_same_commands(*runs)

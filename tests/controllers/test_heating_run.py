@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from short_trip import assert_same_commands, drive_in
 
-import qpmpc
 from qpmpc.codegen.c_compiler import compiler
 from qpmpc.controllers.heating_run import BEYOND_K, heating_run_w
 from qpmpc.controllers.safety import T_CL_MARGIN_K
@@ -209,9 +209,7 @@ def test_a_free_engine_idles_at_the_limit_and_ends_with_the_rest() -> None:
 
 def drive(made_in: str, trip: str = "train-095", car: str = "prius-nimh") -> Trajectory:
     names = ("thermal.t_amb_degc", "trip.soc_init", "trip.t_cl_init_degc")
-    settings = dict(zip(names, WEATHER[trip], strict=True))
-    chosen = {**settings, "mh_qp.implementation": made_in}
-    return qpmpc.simulate(trip, "mh-qp", vehicle=car, settings=chosen).trajectory
+    return drive_in(made_in, trip, car, dict(zip(names, WEATHER[trip], strict=True)))
 
 
 def test_a_run_before_the_arrival_is_spared(monkeypatch) -> None:
@@ -242,5 +240,4 @@ def test_a_cold_trip_ends_no_warmer_than_it_must(monkeypatch) -> None:
 )
 def test_c_heats_as_python_does(trip: str, car: str) -> None:
     runs = [drive(made_in, trip, car) for made_in in ("python", "c")]
-    np.testing.assert_array_equal(runs[0].engine_on, runs[1].engine_on)
-    np.testing.assert_allclose(runs[0].p_eng_w, runs[1].p_eng_w, rtol=1e-6, atol=1e-3)
+    assert_same_commands(*runs)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from short_trip import assert_same_commands, drive_in
 
 import qpmpc
 from qpmpc.codegen.c_compiler import compiler
@@ -164,8 +165,7 @@ SOC_G = 165.0  # of a unit of SOC on this trip, dynamic programming's
 
 
 def drive(made_in: str) -> Trajectory:
-    settings = {**OF_ROAD, "mh_qp.implementation": made_in}
-    return qpmpc.simulate(ROAD, "mh-qp", vehicle="prius-liion", settings=settings).trajectory
+    return drive_in(made_in, ROAD, "prius-liion", OF_ROAD)
 
 
 def test_a_start_before_the_arrival_is_spared(monkeypatch) -> None:
@@ -182,8 +182,7 @@ def test_a_start_before_the_arrival_is_spared(monkeypatch) -> None:
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 def test_c_goes_on_as_python_does() -> None:
     runs = [drive(made_in) for made_in in ("python", "c")]
-    np.testing.assert_array_equal(runs[0].engine_on, runs[1].engine_on)
-    np.testing.assert_allclose(runs[0].p_eng_w, runs[1].p_eng_w, rtol=1e-6, atol=1e-3)
+    assert_same_commands(*runs)
 
 
 def test_the_last_run_begins_while_the_car_drives(monkeypatch) -> None:

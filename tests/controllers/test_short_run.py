@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from short_trip import assert_same_commands, drive_in
 
-import qpmpc
 from qpmpc.codegen.c_compiler import compiler
 from qpmpc.controllers.short_run import short_run_w
 from qpmpc.preview.stages import Stages
@@ -125,8 +125,7 @@ OF_ROAD = {
 
 
 def drive(made_in: str) -> Trajectory:
-    settings = {**OF_ROAD, "mh_qp.implementation": made_in}
-    return qpmpc.simulate(ROAD, "mh-qp", vehicle="prius-liion", settings=settings).trajectory
+    return drive_in(made_in, ROAD, "prius-liion", OF_ROAD)
 
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -135,8 +134,7 @@ def test_c_begins_as_python_does(monkeypatch) -> None:
     now, in_c = drive("python"), drive("c")
     monkeypatch.setattr("qpmpc.controllers.qp_planner.short_run_w", lambda *_: 0.0)
     before = drive("python")
-    np.testing.assert_array_equal(now.engine_on, in_c.engine_on)
-    np.testing.assert_allclose(now.p_eng_w, in_c.p_eng_w, rtol=1e-6, atol=1e-3)
+    assert_same_commands(now, in_c)
     taken, left = now.engine_on & ~before.engine_on, before.engine_on & ~now.engine_on
     assert taken.sum() == left.sum() > 0
     assert now.demand_w[taken].min() > now.demand_w[left].max()
