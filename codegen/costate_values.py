@@ -5,16 +5,17 @@ from numpy.typing import NDArray
 
 from qpmpc.codegen.calibration import Bounds, calibration_of
 from qpmpc.codegen.forecast_values import fixed_block_s
-from qpmpc.codegen.shared_values import shared_values
+from qpmpc.codegen.shared_values import BEYOND_ALL_W, shared_values
 from qpmpc.codegen.values import CONSTANTS_OF_ALL, Values, of_modules
 from qpmpc.controllers import mh_costate
 from qpmpc.controllers.mh_costate import MhCostateSettings, most_charge_g, unit_g
 from qpmpc.controllers.settings import RuleBasedSettings
-from qpmpc.costate import certificate, dual, funnel, solve, stage
-from qpmpc.costate.curves import Curves
+from qpmpc.costate import certificate, dual, funnel, solve
 from qpmpc.costate.path import Shortest
 from qpmpc.costate.solve import moderate
 from qpmpc.errors import InputError
+from qpmpc.pwa import priced
+from qpmpc.pwa.curves import Curves
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp import rows
 from qpmpc.qp.rows import table_of
@@ -25,12 +26,11 @@ from qpmpc.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
 
-BEYOND_ALL_W = 1e30
 MOST_STATES = 32  # of the shortest path, a bit each
 
 CONSTANTS = CONSTANTS_OF_ALL | of_modules(
     (rows, "SHORTEST_SCALE_S LEAST_FORCED COOL_SHARE SOC_KEPT"),
-    (stage, "LEAST_RATIO LEAST_PRICE"),
+    (priced, "LEAST_RATIO LEAST_PRICE"),
     (funnel, "ENDLESS_RESPONSE LEAST_RESPONSE UNLIMITED"),
     (
         solve,
@@ -61,8 +61,8 @@ def costate_values_of(
         short horizon are both longer than generated code can hold.
     """
     model, engine = PwaModel.of(vehicle), vehicle.engine
-    shared = shared_values(vehicle, model, settings.horizon, rules, blocks, "mh_costate")
     curves = Curves.of(vehicle, model.line)
+    shared = shared_values(vehicle, model, settings.horizon, rules, blocks, "mh_costate", curves)
     envelope, shortest = curves.envelope(), Shortest.of(engine)
     stride = 1 << max((len(envelope.slope) - 1).bit_length() - 1, 0)
     most_states = settings.horizon.short_stages + 1
@@ -73,16 +73,12 @@ def costate_values_of(
             f"{engine.min_off_s} may be {MOST_STATES} at most with "
             f"mh_costate.horizon.short_stages={settings.horizon.short_stages}"
         )
-    table, square_v2 = table_of(engine), curves.square_v2
+    table = table_of(engine)
     moderate_w, moderate_g_per_s = moderate(curves)
     limits = QpSettings(**settings.limits.model_dump())
     scalars = {
         **qp_parameters(vehicle, model, limits, ScalingSettings()),
         **shared.scalars,
-        "quarter_discharge_w": square_v2 / (4.0 * curves.discharge_ohm),
-        "quarter_charge_w": square_v2 / (4.0 * curves.charge_ohm),
-        "per_quarter_mean": 2.0 * (curves.discharge_ohm + curves.charge_ohm) / square_v2,
-        "per_quarter_half": 2.0 * (curves.discharge_ohm - curves.charge_ohm) / square_v2,
         "moderate_w": moderate_w,
         "moderate_g_per_s": moderate_g_per_s,
         "cold_charge_g": mh_costate.COLD_CHARGE * unit_g(model),
@@ -91,10 +87,6 @@ def costate_values_of(
     scalars["cranking_soc"] = scalars["cranking_j"] / scalars["battery_energy_j"]
     arrays = {
         **shared.arrays,
-        **{
-            f"line_{part}": getattr(curves, part)
-            for part in ("begin_w", "end_w", "slope", "intercept")
-        },
         "shared": _for_bisection(envelope, stride),
     }
     calibration = calibration_of(vehicle, scalars, table.has_start, search=_search(table.has_start))
@@ -120,7 +112,6 @@ def costate_values_of(
         costate={
             "SHARED_PIECES": len(envelope.slope),
             "SHARED_STRIDE": stride,
-            "LINE_PIECES": len(curves.slope),
             "RUN_STATES": run,
             "REST_STATES": rest,
         },

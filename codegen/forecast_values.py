@@ -10,7 +10,6 @@ def forecast_scalars(vehicle: Vehicle, horizon: HorizonSettings) -> dict[str, fl
         "class_hard_w": horizon.class_hard_w,
         "class_braking_w": horizon.class_braking_w,
         "rise_share": horizon.rise_share,
-        "entry_share": horizon.entry_share,
         "swing_share": horizon.swing_share,
         **vehicle.chassis.model_dump(),
     }

@@ -11,11 +11,14 @@ from qpmpc.controllers.rule_based import last_rung
 from qpmpc.controllers.settings import RuleBasedSettings
 from qpmpc.errors import InputError
 from qpmpc.preview.horizon import HorizonSettings
+from qpmpc.pwa.curves import Curves
 from qpmpc.pwa.model import PwaModel
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.capability import Capability
 from qpmpc.vehicle.engine import OptimalLine, optimal_line
 from qpmpc.vehicle.parameters import Vehicle
+
+BEYOND_ALL_W = 1e30
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,7 @@ class Sizes:
     ----------
     short_stages, blocks, classes : layout of the horizon
     fuel_pieces, battery_pieces, alpha_pieces : pieces of the PWA curves
+    line_pieces : chords of the engine's line
     fuel_points, soc_points : points of the tables
     """
 
@@ -35,6 +39,7 @@ class Sizes:
     fuel_pieces: int
     battery_pieces: int
     alpha_pieces: int
+    line_pieces: int
     fuel_points: int
     soc_points: int
 
@@ -65,8 +70,9 @@ def shared_values(
     rules: RuleBasedSettings,
     blocks: int | None,
     section: str,
+    curves: Curves,
 ) -> Shared:
-    """Collect the numbers that do not depend on the method.
+    """Collect the numbers that do not depend on the method; `curves` are those of a second.
 
     Raises
     ------
@@ -89,11 +95,13 @@ def shared_values(
             model.fuel.pieces,
             model.battery.pieces,
             model.alpha.pieces,
+            len(curves.slope),
             len(line.power_w),
             len(grid),
         ),
         {
             **_plant(vehicle, line, maps),
+            **_battery_of(curves),
             **_rules(vehicle, last_rung(rules, vehicle)),
             **forecast_scalars(vehicle, horizon),
         },
@@ -108,6 +116,10 @@ def shared_values(
             "resistance_charge_ohm": _array(vehicle.battery.resistance_charge_ohm),
             "resistance_discharge_ohm": _array(vehicle.battery.resistance_discharge_ohm),
             "fuel_g_per_s": line.fuel_g_per_s,
+            "line_begin_w": curves.begin_w,
+            "line_end_w": np.append(curves.end_w[:-1], BEYOND_ALL_W),
+            "line_slope": curves.slope,
+            "line_intercept": curves.intercept,
         },
         {
             "min_on_s": vehicle.engine.min_on_s,
@@ -136,6 +148,17 @@ def _plant(vehicle: Vehicle, line: OptimalLine, maps: BatteryMaps) -> dict[str, 
         "plan_voltage_v": maps.open_circuit.at(soc_mean),
         "plan_resistance_discharge_ohm": maps.discharge.at(soc_mean),
         "plan_resistance_charge_ohm": maps.charge.at(soc_mean),
+    }
+
+
+def _battery_of(curves: Curves) -> dict[str, float]:
+    """Return U^2 / (4 R) of the plan's battery, and mean and half difference of 4 R / U^2."""
+    discharge_ohm, charge_ohm, square_v2 = curves.discharge_ohm, curves.charge_ohm, curves.square_v2
+    return {
+        "quarter_discharge_w": square_v2 / (4.0 * discharge_ohm),
+        "quarter_charge_w": square_v2 / (4.0 * charge_ohm),
+        "per_quarter_mean": 2.0 * (discharge_ohm + charge_ohm) / square_v2,
+        "per_quarter_half": 2.0 * (discharge_ohm - charge_ohm) / square_v2,
     }
 
 

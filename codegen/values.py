@@ -15,7 +15,7 @@ from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS
 from qpmpc.controllers.settings import MhQpSettings, RuleBasedSettings
 from qpmpc.errors import InputError
 from qpmpc.preview import checked, swing
-from qpmpc.pwa import learned_fuel
+from qpmpc.pwa import learned_fuel, priced
 from qpmpc.pwa.model import PwaModel
 from qpmpc.pwa.model import learned_fuel as learner_of
 from qpmpc.qp import coolant_floor, last_run, linearisation, polish, relaxation, rows, stage_qp
@@ -53,7 +53,7 @@ CONSTANTS_OF_ALL = of_modules(
 CONSTANTS = CONSTANTS_OF_ALL | of_modules(
     (relaxation, "LEAST_SIZE_W"),
     (stage_qp, "LEAST_COST"),
-    (polish, "LEAST_RATIO"),
+    (priced, "LEAST_RATIO LEAST_PRICE"),
     (heating_run, "IDLING_W BEYOND_K LEAST_GROWTH"),
     (
         last_run,
@@ -159,11 +159,13 @@ def values_of(
     """
     _refuse_unknown(settings, section)
     model = PwaModel.of(vehicle, settings.pwa, settings.learning)
-    shared = shared_values(vehicle, model, settings.horizon, rules, blocks, section)
+    curves = polish.Polish(vehicle, model, settings.learning).curves
+    shared = shared_values(vehicle, model, settings.horizon, rules, blocks, section, curves)
     scalars = {
         **qp_parameters(vehicle, model, settings.qp, settings.scaling),
         **shared.scalars,
         **_solver(settings.admm),
+        "entry_share": settings.horizon.entry_share,
     }
     if not settings.qp.soc_penalty_g:
         band = (scalars["terminal_soc_high"] - scalars["terminal_soc_low"]) / scalars["unit_soc"]
@@ -174,10 +176,10 @@ def values_of(
             )
     arrays = {
         **pieces_of(model),
-        "fuel_begin_w": model.fuel.breakpoints[:-1],
         **shared.arrays,
     }
     if settings.learning:
+        del arrays["line_slope"], arrays["line_intercept"]  # those learned instead
         learner = learner_of(vehicle, settings.pwa)
         scalars["learned_most_g"] = learner.most_g
         arrays["learned_power_w"] = learner.power_w

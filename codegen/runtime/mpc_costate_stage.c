@@ -3,25 +3,15 @@
  *     min_E  w_F f(E) + w_E E + w_G l(P0 - E)   between the limits of E
  *
  * On a piece of f of slope a the slope of l has to be r = (w_F a + w_E) / w_G, at the battery power
- * U^2 (1 - 1 / r^2) / (4 R). The same in Python: qpmpc/costate/stage.py.
+ * U^2 (1 - 1 / r^2) / (4 R). The same in Python: qpmpc/pwa/priced.py.
  */
 #include "mpc_constants.h"
 #include "mpc_costate_parts.h"
 #include "mpc_model.h"
+#include "mpc_priced.h"
 #include "mpc_real.h"
 
-#define NEVER_G REAL(1.0e30)
 #define MOST_GIVEN REAL(1.0e30) /* finite where the price is nil */
-
-/* Prices of a stage; those of fuel and power in that of the battery's store too. */
-typedef struct {
-    mpc_real fuel;
-    mpc_real power;
-    mpc_real internal;
-    mpc_real per; /* 1 / internal */
-    mpc_real fuel_ratio;
-    mpc_real power_ratio;
-} prices;
 
 /* What a part answers to them with its engine on. */
 typedef struct {
@@ -32,41 +22,14 @@ typedef struct {
     mpc_real gives; /* dE of a unit of marginal cost */
 } least;
 
-static inline prices prices_of(const mpc_stage_program *of, const mpc_costate_dual *dual)
+static inline stage_prices prices_of(const mpc_stage_program *of, const mpc_costate_dual *dual)
 {
     const mpc_real internal = dual->charge * of->charge_per_w;
     const mpc_real per = REAL(1.0) / real_max(internal, LEAST_PRICE);
     const mpc_real fuel = of->fuel_cost - (dual->nu * of->per_fuel);
     const mpc_real power = dual->nu * of->per_power;
-    const prices price = {fuel, power, internal, per, fuel * per, power * per};
+    const stage_prices price = {fuel, power, internal, per, fuel * per, power * per};
     return price;
-}
-
-/* r of a piece of this slope */
-static inline mpc_real ratio_at(const prices *price, mpc_real slope)
-{
-    return real_max((price->fuel_ratio * slope) + price->power_ratio, LEAST_RATIO);
-}
-
-/* U^2 / (4 R) of the battery */
-static inline mpc_real quarter_w(int32_t discharges)
-{
-    return pick(discharges, mpc_par.quarter_discharge_w, mpc_par.quarter_charge_w);
-}
-
-/* 1 - 4 R P / U^2 */
-static inline mpc_real under_root(mpc_real power_w)
-{
-    return (REAL(1.0) - (power_w * mpc_par.per_quarter_mean))
-           - (REAL_ABS(power_w) * mpc_par.per_quarter_half);
-}
-
-/* l(P); beyond the most that the battery can give the current stays. */
-static inline mpc_real internal_w(mpc_real power_w)
-{
-    const mpc_real root = REAL_SQRT(real_max(under_root(power_w), REAL(0.0)));
-    const mpc_real most = quarter_w((power_w > REAL(0.0)) ? 1 : 0);
-    return (REAL(2.0) * real_min(power_w, most)) / (REAL(1.0) + root);
 }
 
 /* A row of the table of pieces: slope, end, begin, intercept. */
@@ -75,7 +38,7 @@ enum { SLOPE = 0, END = 1, BEGIN = 2, INTERCEPT = 3, ROW = 4 };
 /* Row of the piece of the envelope that the least of all powers lies on, by bisection: the first
  * whose end it does not lie beyond. That is where the slope of l is below r there:
  * r^2 (1 - 4 R P / U^2) < 1. After the pieces come rows that nothing lies beyond. */
-static inline const mpc_real *row_of_least(const prices *price, mpc_real net_w)
+static inline const mpc_real *row_of_least(const stage_prices *price, mpc_real net_w)
 {
     const mpc_real *row = &mpc_par.shared[0];
     for (int32_t stride = MPC_SHARED_STRIDE; stride > 0; stride /= 2) {
@@ -97,7 +60,7 @@ mpc_real mpc_costate_shared_fuel(mpc_real power_w)
 }
 
 /* With the convex envelope of f. */
-static inline least least_shared(const mpc_costate_part *part, const prices *price)
+static inline least least_shared(const mpc_costate_part *part, const stage_prices *price)
 {
     const mpc_real net_w = part->net_w;
     const mpc_real *const row = row_of_least(price, net_w);
@@ -128,7 +91,7 @@ void mpc_costate_minimise(mpc_state *state, int32_t which)
         mpc_stage *const stage = &state->stage[k];
         const mpc_stage_program *const of = &stage->p.of;
         mpc_costate_dual *const dual = &stage->dual[which];
-        const prices price = prices_of(of, dual);
+        const stage_prices price = prices_of(of, dual);
         const int32_t parts = (k < MPC_SHORT) ? 1 : MPC_PARTS;
         for (int32_t i = 0; i < parts; i++) {
             const mpc_costate_part *const part = &stage->p.part[i];
@@ -157,7 +120,7 @@ void mpc_costate_minimise_exactly(mpc_stage *stage, int32_t which)
     mpc_costate_dual *const dual = &stage->dual[which];
     const mpc_costate_part *const part = &stage->p.part[MPC_FREE];
     mpc_drive *const on = &dual->drive[MPC_FREE];
-    const prices price = prices_of(&stage->p.of, dual);
+    const stage_prices price = prices_of(&stage->p.of, dual);
     const mpc_real net_w = part->net_w;
     mpc_real least_g = NEVER_G;
     for (int32_t i = 0; i < MPC_LINE_PIECES; i++) {

@@ -1,6 +1,4 @@
-/* A second minimised at the plan's prices of SOC and coolant, on the battery's own curve:
- *
- *     min_E  w_F f(E) + w_E E + w_G l(P0 - E)
+/* A second minimised at the plan's prices of SOC and coolant (mpc_priced.h), on the engine's line.
  *
  * The same in Python, with the derivation: qpmpc/qp/polish.py.
  */
@@ -8,7 +6,26 @@
 #include "mpc_learned.h"
 #include "mpc_model.h"
 #include "mpc_parts.h"
+#include "mpc_priced.h"
 #include "mpc_real.h"
+
+/* The engine's line, or the curve learned. */
+#if MPC_LEARNING
+#define LINE_SLOPE(i) (state->learned.slope[i])
+#define LINE_INTERCEPT(i) (state->learned.intercept[i])
+#define LINE_SCALE REAL(1.0)
+#else
+#define LINE_SLOPE(i) (mpc_par.line_slope[i])
+#define LINE_INTERCEPT(i) (mpc_par.line_intercept[i])
+#define LINE_SCALE (state->cal.fuel_scale)
+#endif
+
+/* A least-cost power, with the fuel and the battery's internal power there. */
+typedef struct {
+    mpc_real power_w;
+    mpc_real fuel_g_per_s;
+    mpc_real internal_w;
+} least_drive;
 
 /* Price of a variable by a row: dual times entry, in SI units. */
 static mpc_real by_row(const mpc_stage *stage, int32_t row, int32_t variable, mpc_real entry)
@@ -26,39 +43,69 @@ mpc_prices mpc_polish_prices(const mpc_state *state)
     return prices;
 }
 
-mpc_real mpc_polish_power_w(const mpc_state *state, const mpc_prices *prices, int32_t k,
+/* Power of least cost on a piece of the line, of this slope, between these. */
+static mpc_real power_on(const stage_prices *price, mpc_real net_w, int32_t piece, mpc_real slope,
+                         mpc_real low_w, mpc_real high_w)
+{
+    const mpc_real ratio = ratio_at(price, slope);
+    const mpc_real inverse = REAL(1.0) / ratio;
+    const mpc_real quarter = quarter_w((ratio > REAL(1.0)) ? 1 : 0);
+    const mpc_real own_w = net_w - (quarter * (REAL(1.0) - (inverse * inverse)));
+    return real_min(real_max(own_w, real_max(mpc_par.line_begin_w[piece], low_w)),
+                    real_min(mpc_par.line_end_w[piece], high_w));
+}
+
+/* Of all pieces of the line, which need not be convex, that of least cost; at planned_w if a charge
+ * has no price. */
+static least_drive least_of(const mpc_state *state, const mpc_prices *paid, int32_t k,
                             mpc_real planned_w)
 {
     const mpc_real net_w = state->stage[k].road.net_w;
-    const int32_t is_priced = ((prices->internal > REAL(0.0)) && (mpc_par.polish != 0)) ? 1 : 0;
-    const mpc_real divisor = (is_priced != 0) ? prices->internal : REAL(1.0);
-    const mpc_real quarter = (mpc_par.plan_voltage_v * mpc_par.plan_voltage_v) / REAL(4.0);
-    mpc_real best_w = mpc_par.engine_max_w;
-    for (int32_t i = 0; i < MPC_FUEL_PIECES; i++) {
-        const mpc_real priced = ((prices->fuel * FUEL_SLOPE(i)) + prices->p_eng) / divisor;
-        const mpc_real ratio = real_max(priced, LEAST_RATIO);
-        const mpc_real resistance = (ratio > REAL(1.0)) ? mpc_par.plan_resistance_discharge_ohm
-                                                        : mpc_par.plan_resistance_charge_ohm;
-        const mpc_real battery_w = (quarter / resistance)
-                                   * (REAL(1.0) - (REAL(1.0) / (ratio * ratio)));
-        best_w = real_min(best_w, real_max(net_w - battery_w, mpc_par.fuel_begin_w[i]));
+    const int32_t is_priced = ((paid->internal > REAL(0.0)) && (mpc_par.polish != 0)) ? 1 : 0;
+    const mpc_real internal = pick(is_priced, paid->internal, REAL(1.0));
+    const mpc_real per = REAL(1.0) / real_max(internal, LEAST_PRICE);
+    const mpc_real fuel = LINE_SCALE * paid->fuel;
+    const stage_prices price = {fuel, paid->p_eng, internal, per, fuel * per, paid->p_eng * per};
+    const mpc_real least_w =
+        real_max(mpc_par.engine_min_w, net_w - mpc_par.battery_discharge_max_w);
+    const mpc_real most_w =
+        real_max(real_min(mpc_par.engine_max_w, net_w + mpc_par.battery_charge_max_w), least_w);
+    const mpc_real low_w = pick(is_priced, least_w, planned_w);
+    const mpc_real high_w = pick(is_priced, most_w, planned_w);
+    mpc_real least_g = NEVER_G;
+    int32_t best = 0;
+    for (int32_t i = 0; i < MPC_LINE_PIECES; i++) {
+        const mpc_real power_w = power_on(&price, net_w, i, LINE_SLOPE(i), low_w, high_w);
+        const mpc_real burnt = (LINE_SLOPE(i) * power_w) + LINE_INTERCEPT(i);
+        const mpc_real inside_g = (price.fuel * burnt) + (price.power * power_w)
+                                  + (price.internal * internal_w(net_w - power_w));
+        /* without a branch, so that every second takes the same instructions */
+        const mpc_real outside_w = real_max(real_max(mpc_par.line_begin_w[i], low_w)
+                                                - real_min(mpc_par.line_end_w[i], high_w),
+                                            REAL(0.0));
+        const mpc_real cost_g = inside_g + (NEVER_G * outside_w);
+        best = (cost_g < least_g) ? i : best;
+        least_g = real_min(least_g, cost_g);
     }
-    const mpc_real low_w = real_max(mpc_par.engine_min_w, net_w - mpc_par.battery_discharge_max_w);
-    const mpc_real high_w =
-        real_max(real_min(mpc_par.engine_max_w, net_w + mpc_par.battery_charge_max_w), low_w);
-    return (is_priced != 0) ? real_clip(best_w, low_w, high_w) : planned_w;
+    const mpc_real power_w = power_on(&price, net_w, best, LINE_SLOPE(best), low_w, high_w);
+    const mpc_real burnt = (LINE_SLOPE(best) * power_w) + LINE_INTERCEPT(best);
+    const least_drive least = {power_w, LINE_SCALE * burnt, internal_w(net_w - power_w)};
+    return least;
+}
+
+mpc_real mpc_polish_power_w(const mpc_state *state, const mpc_prices *prices, int32_t k,
+                            mpc_real planned_w)
+{
+    return least_of(state, prices, k, planned_w).power_w;
 }
 
 #if MPC_STARTS
 mpc_going mpc_polish_going(const mpc_state *state, const mpc_prices *prices, int32_t k)
 {
-    const mpc_stage_road *const road = &state->stage[k].road;
-    const mpc_real power_w = mpc_polish_power_w(state, prices, k, REAL(0.0));
-    const mpc_real gain_w = road->internal_off_w
-                            - mpc_map_planned_internal_w(road->net_w - power_w);
-    const mpc_real spent = (prices->fuel * mpc_qp_least_fuel(state, power_w, REAL(1.0)))
-                           + (prices->p_eng * power_w);
-    const mpc_going going = {power_w, gain_w, spent - (prices->internal * gain_w)};
+    const least_drive on = least_of(state, prices, k, REAL(0.0));
+    const mpc_real gain_w = state->stage[k].road.internal_off_w - on.internal_w;
+    const mpc_real spent = (prices->fuel * on.fuel_g_per_s) + (prices->p_eng * on.power_w);
+    const mpc_going going = {on.power_w, gain_w, spent - (prices->internal * gain_w)};
     return going;
 }
 #endif

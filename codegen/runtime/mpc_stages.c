@@ -23,6 +23,14 @@ static void take_refill(mpc_state *state)
     }
 }
 
+#if MPC_COSTATE
+/* Starts per on-share that a stage has more than the one before: what rises into a class of a block,
+ * falls from it to the next stage, the class below. Blocks share prices alone. */
+static mpc_real rises_of(const mpc_state *state, const mpc_in *in, int32_t k)
+{
+    return ((k % MPC_CLASSES) > 0) ? -(state->cal.rise_share * in->long_rises[k - 1]) : REAL(0.0);
+}
+#else
 /* Whether a block has seconds of the classes from one stage up to another. */
 static int32_t has(const mpc_in *in, int32_t from, int32_t to)
 {
@@ -45,6 +53,7 @@ static mpc_real rises_of(const mpc_state *state, const mpc_in *in, int32_t k)
     const mpc_real enters = (MPC_CLASSES > 1) ? mpc_par.entry_share : REAL(0.0);
     return ((inside != 0) || (enters <= REAL(0.0))) ? -falls : enters;
 }
+#endif
 
 /* Preview to stages: seconds first, then the classes of each block; past stages are masked. */
 void mpc_stages_take(mpc_state *state, const mpc_in *in)

@@ -130,7 +130,7 @@ class QpPlanner(Planner):
         self.qp = StageQp(
             vehicle, self.model, self.preview.count, self.of_qp.qp, self.of_qp.scaling, learning
         )
-        self._polish = Polish(vehicle, self.model)
+        self._polish = Polish(vehicle, self.model, learning)
         self._certificate = certificate_of(self.qp, self.of_qp, name)
         self._ramp = RampFloor(vehicle)
         self.last: QpPlan | None = None

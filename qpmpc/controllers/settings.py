@@ -78,7 +78,7 @@ class MhQpSettings(BaseModel):
         iterations of `admm`, which is OSQP in Python and our own code in C
     admm : settings if `solver` is not set, and of `osqp`
     polish : minimise the coming second once more at the plan's prices of SOC and heat, on the
-        battery's own curve, see `qpmpc.qp.polish`
+        curves of engine and battery themselves, see `qpmpc.qp.polish`
     prepared : solve the first QP before the trip starts; if not, the rules drive the first steps
         while the solver warms up
     learning : add idle and slope to the fuel map by the fuel injected, see `LearnedFuel`

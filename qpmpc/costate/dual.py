@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from qpmpc.costate.curves import Curves
 from qpmpc.costate.funnel import funnel
 from qpmpc.costate.program import Program
-from qpmpc.costate.stage import Least, least, least_convex
+from qpmpc.pwa.curves import Curves
+from qpmpc.pwa.priced import Least, least, least_convex
 
 Floats = NDArray[np.float64]
 

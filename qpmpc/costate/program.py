@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpmpc.costate.curves import Curves
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.preview.stages import Stages
+from qpmpc.pwa.curves import Curves
 from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.expressions import code_of, parsed, targets_of
 from qpmpc.qp.linearisation import Linearisation

@@ -6,10 +6,10 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from qpmpc.costate.curves import Curves
 from qpmpc.costate.dual import Dual, Multipliers, dual, with_signs
 from qpmpc.costate.funnel import funnel
 from qpmpc.costate.program import Program
+from qpmpc.pwa.curves import Curves
 
 Floats = NDArray[np.float64]
 

@@ -1,9 +1,9 @@
-"""The first second minimised at the plan's prices, on the battery's own curve.
+"""The first second minimised at the plan's prices, on the engine's and the battery's own curves.
 
 The plan couples the seconds by SOC and coolant temperature alone. At the prices of the two that the
 QP's duals give, each second can be minimised by itself; that of the coming one is, because its
-power is what the engine gets. The QP knows the battery's losses by a few straight pieces and stops
-after K iterations; its prices are better than its power.
+power is what the engine gets. The QP knows fuel and the battery's losses by a few straight pieces
+and stops after K iterations; its prices are better than its power.
 
 The same in C: codegen/runtime/mpc_polish.c.
 """
@@ -13,12 +13,15 @@ from typing import NamedTuple
 import numpy as np
 
 from qpmpc.preview.stages import Stages
+from qpmpc.pwa.curves import Curves
 from qpmpc.pwa.fit import PwaFit
 from qpmpc.pwa.model import PwaModel
+from qpmpc.pwa.priced import Least, least
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.parameters import Vehicle
 
-LEAST_RATIO = 1e-3  # of prices: below it charging is for nothing, and has no least cost
+# Of the chords of the engine's line, and the power beyond which it seldom runs, see `Curves.of`.
+LINE_TOLERANCE_G_PER_S, LINE_KNEE_W = 2e-4, 20e3
 
 
 class Prices(NamedTuple):
@@ -56,60 +59,65 @@ class Polish:
 
         min_E  w_F f(E) + w_E E + w_G l(P0 - E)
 
-    with f the fitted fuel curve of slopes a_i and l(P) = U (U - sqrt(U^2 - 4 R P)) / (2 R) the
-    battery's internal power. On piece i the slope of l has to be r_i = (w_F a_i + w_E) / w_G, at
+    with f the fuel of the engine's line, not its fit, which misses where its slope jumps, and
+    l(P) = U (U - sqrt(U^2 - 4 R P)) / (2 R) the battery's internal power. On piece i of f, of
+    slope a_i, the slope of l has to be r_i = (w_F a_i + w_E) / w_G, at
 
         P_i = U^2 (1 - 1 / r_i^2) / (4 R),  with R of discharge for r_i > 1, else of charge
 
-    and E is the least of max(P0 - P_i, begin of piece i), within the limits of the engine and of
-    the battery.
+    and E is P0 - P_i, within the piece and the limits of the engine and of the battery. f need not
+    be convex: E is that of the piece of least cost. Where the curve is learned, f is that.
 
     Parameters
     ----------
     vehicle, model : of the QP
+    learning : whether the fuel curve is learned
 
     Attributes
     ----------
-    fuel : f, as it is known now
+    fuel : the plan's fuel curve, as it is known now
+    curves : f and l
     maps : of the battery
     """
 
-    def __init__(self, vehicle: Vehicle, model: PwaModel) -> None:
-        maps, soc = BatteryMaps(vehicle.battery), vehicle.trip.soc_mean
-        self._vehicle, self.maps = vehicle, maps
-        self.learn(model.fuel)
-        square = maps.open_circuit.at(soc) ** 2
-        self._discharge_w = square / (4.0 * maps.discharge.at(soc))
-        self._charge_w = square / (4.0 * maps.charge.at(soc))
+    def __init__(self, vehicle: Vehicle, model: PwaModel, learning: bool = False) -> None:
+        self._vehicle, self.maps = vehicle, BatteryMaps(vehicle.battery)
+        self.fuel = model.fuel
+        self.curves = Curves.of(vehicle, model.line, LINE_TOLERANCE_G_PER_S, LINE_KNEE_W)
+        if learning:
+            self.learn(model.fuel)
 
     def learn(self, fuel: PwaFit) -> None:
         """Use another fuel curve from now on."""
         self.fuel = fuel
+        curves, power_w = self.curves, fuel.breakpoints
+        ohms = curves.discharge_ohm, curves.charge_ohm
+        self.curves = Curves.through(power_w, fuel(power_w), curves.square_v2, *ohms)
 
     def internal_w(self, power_w: float) -> float:
         """Return the battery's internal power l(P)."""
-        soc = self._vehicle.trip.soc_mean
-        return float(self.maps.internal_power_w(soc, np.array([power_w]))[0])
+        return float(self.curves.internal_w(np.array(power_w)))
 
     def power_w(self, prices: Prices, net_w: float, planned_w: float) -> float:
         """Return that power, or `planned_w` where a charge in the battery has no price."""
-        if not prices.internal > 0.0:
-            return planned_w
-        vehicle, engine = self._vehicle, self._vehicle.engine
-        ratio = (prices.fuel * self.fuel.slope + prices.p_eng) / prices.internal
-        ratio = np.maximum(ratio, LEAST_RATIO)
-        most_w = np.where(ratio > 1.0, self._discharge_w, self._charge_w)
-        best_w = net_w - most_w * (1.0 - 1.0 / ratio**2)
-        low_w = max(engine.power_min_w, net_w - vehicle.battery_discharge_max_w)
-        high_w = max(min(engine.power_max_w, net_w + vehicle.battery_charge_max_w), low_w)
-        return min(max(float(np.maximum(best_w, self.fuel.breakpoints[:-1]).min()), low_w), high_w)
+        return float(self._least(prices, net_w, planned_w).power_w[0])
 
     def going(self, prices: Prices, net_w: float, off_w: float) -> Going:
         """Return the second of net power P0 and internal power with the engine off l(P0)."""
-        power_w = self.power_w(prices, net_w, 0.0)
-        gain_w = off_w - self.internal_w(net_w - power_w)
-        spent = prices.fuel * float(self.fuel(power_w)) + prices.p_eng * power_w
+        on = self._least(prices, net_w, 0.0)
+        power_w, gain_w = float(on.power_w[0]), off_w - float(on.internal_w[0])
+        spent = prices.fuel * float(on.fuel_g_per_s[0]) + prices.p_eng * power_w
         return Going(power_w, gain_w, spent - prices.internal * gain_w)
+
+    def _least(self, prices: Prices, net_w: float, planned_w: float) -> Least:
+        vehicle, engine = self._vehicle, self._vehicle.engine
+        low_w = max(engine.power_min_w, net_w - vehicle.battery_discharge_max_w)
+        high_w = max(min(engine.power_max_w, net_w + vehicle.battery_charge_max_w), low_w)
+        if not prices.internal > 0.0:
+            low_w = high_w = planned_w
+            prices = prices._replace(internal=1.0)
+        of_one = (np.array([each]) for each in (net_w, low_w, high_w, *prices))
+        return least(self.curves, *of_one)
 
     def going_in(self, prices: Prices, stages: Stages, k: int) -> Going:
         """Return the k-th of the coming seconds."""

@@ -145,18 +145,17 @@ def scaled(vehicle: Vehicle, factor: float) -> Vehicle:
 def test_the_factor_on_the_fuel_map_is_as_another_map(name) -> None:
     """To rounding; the plan's reserve of heat, made of the map, is a number of its own.
 
-    The costate method's chords are fitted to so many g/s: here as many as before, not fewer.
+    The chords of a second are fitted to so many g/s: here those of before, scaled.
     """
     of, car = method(name), scaled(VEHICLE, 1.1)
     old, new = (method(name).values(scaled(VEHICLE, factor), None) for factor in (1.0, 1.1))
+    chords = {key: value for key, value in old.arrays.items() if key.startswith("line_")}
+    for key in ("line_slope", "line_intercept"):
+        chords[key] = 1.1 * chords[key]
     if name == "mh-costate":
-        chords = {key: value for key, value in old.arrays.items() if key.startswith("line_")}
-        for key in ("line_slope", "line_intercept"):
-            chords[key] = 1.1 * chords[key]
         rows = old.arrays["shared"].reshape(-1, 4) * [1.1, 1.0, 1.0, 1.1]  # slope, ends, intercept
-        new = replace(
-            new, arrays={**new.arrays, **chords, "shared": rows.ravel()}, costate=old.costate
-        )
+        chords["shared"] = rows.ravel()
+    new = replace(new, arrays=new.arrays | chords, sizes=old.sizes, costate=old.costate)
     numbers = page(new) | {"fuel_scale": 1.1}
     anew = Driven(build_host_library(new))
     in_ram = Driven(build_host_library(old), numbers)

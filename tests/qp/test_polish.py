@@ -13,8 +13,9 @@ from qpmpc.cycles import load_cycle
 from qpmpc.preview import HorizonSettings, StageBuilder, Trace
 from qpmpc.pwa import PwaModel
 from qpmpc.qp import Linearisation, QpSettings, ScalingSettings, StageQp, Var
-from qpmpc.qp.polish import Polish, Prices
+from qpmpc.qp.polish import LINE_KNEE_W, LINE_TOLERANCE_G_PER_S, Polish, Prices
 from qpmpc.vehicle import load_vehicle
+from qpmpc.vehicle.engine import LINE_STEP_W, optimal_line
 from qpmpc.verification.independent.equations import Equations
 
 CARS = {name: load_vehicle(name) for name in ("prius-nimh", "prius-liion")}
@@ -30,12 +31,20 @@ def limits_w(car, net_w):
     return low, max(min(engine.power_max_w, net_w + car.battery_charge_max_w), low)
 
 
-def cost_of(name, prices, net_w, power_w):
+def fuel_of_line(name, power_w):
+    line = optimal_line(CARS[name].engine)
+    return np.interp(power_w, line.power_w, line.fuel_g_per_s)
+
+
+def fuel_of_chords(name, power_w):
+    return POLISHES[name].curves.fuel_g_per_s(power_w)
+
+
+def cost_of(name, prices, net_w, power_w, fuel_of=fuel_of_line):
     """w_F f(E) + w_E E + w_G l(P0 - E), with l of the equations written a second time."""
-    car, fuel = CARS[name], MODELS[name].fuel
-    power = np.asarray(power_w)
+    car, power = CARS[name], np.asarray(power_w)
     drawn_w = Equations(car).internal_w(car.trip.soc_init, net_w - power)
-    burnt = (np.multiply.outer(power, fuel.slope) + fuel.intercept).max(axis=-1)
+    burnt = fuel_of(name, power)
     return prices.fuel * burnt + prices.p_eng * power + prices.internal * drawn_w
 
 
@@ -55,8 +64,29 @@ def test_no_power_of_a_fine_grid_costs_less(name, fuel, p_eng, internal, net_w) 
     low, high = limits_w(car, net_w)
     found = POLISHES[name].power_w(prices, net_w, 12.0)
     assert low <= found <= high
-    cost = cost_of(name, prices, net_w, np.append(np.linspace(low, high, POINTS), found))
-    assert cost[-1] <= cost.min() + 1e-12 * np.abs(cost).max()
+    power = np.append(np.linspace(low, high, POINTS), found)
+    cost = cost_of(name, prices, net_w, power)
+    # chords are as near to the line as their tolerance, here and where it would cost less
+    chord_g = fuel * LINE_TOLERANCE_G_PER_S * np.maximum(power / LINE_KNEE_W, 1.0) ** 2
+    assert cost[-1] - chord_g[-1] <= (cost + chord_g).min() + 1e-12 * np.abs(cost).max()
+    kinks = POLISHES[name].curves.begin_w
+    power = np.append(power, kinks[(kinks > low) & (kinks < high)])
+    cost = cost_of(name, prices, net_w, power, fuel_of_chords)
+    assert cost[POINTS] <= cost.min() + 1e-12 * np.abs(cost).max()
+
+
+def test_it_knows_where_the_slope_of_the_engines_line_jumps() -> None:
+    """By an eighth at 11.5 kW, the fit's at 11.7 kW: many a second is best just there."""
+    name, polish = "prius-nimh", POLISHES["prius-nimh"]
+    line, of_fit_w = optimal_line(CARS[name].engine), MODELS[name].fuel.breakpoints[1]
+    jumps_w = line.power_w[1:-1][np.diff(line.fuel_g_per_s, 2) > 1e-7 * LINE_STEP_W]
+    prices = Prices(1.0, 0.0, 6e-5)
+    for net_w in (400.0, 2e3, 4e3, 6e3):
+        found_w = polish.power_w(prices, net_w, 0.0)
+        assert np.abs(jumps_w - found_w).min() <= LINE_STEP_W
+        assert abs(of_fit_w - found_w) > 2.0 * LINE_STEP_W
+        found, of_fit = cost_of(name, prices, net_w, [found_w, of_fit_w])
+        assert found < of_fit
 
 
 def test_it_is_an_optimum_that_moves_with_the_prices() -> None:
@@ -65,7 +95,8 @@ def test_it_is_an_optimum_that_moves_with_the_prices() -> None:
     for internal in (5.8e-5, 6.0e-5, 6.3e-5):
         prices = Prices(1.0, 0.0, internal)
         found = POLISHES["prius-nimh"].power_w(prices, 12e3, 0.0)
-        costs = cost_of("prius-nimh", prices, 12e3, [found - 1.0, found, found + 1.0])
+        around_w = [found - 1.0, found, found + 1.0]
+        costs = cost_of("prius-nimh", prices, 12e3, around_w, fuel_of_chords)
         assert costs[1] < min(costs[0], costs[2])
         powers.append(found)
     assert powers == sorted(powers)

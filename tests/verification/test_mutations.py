@@ -357,7 +357,7 @@ def test_the_product_as_it_is_passes_the_same_checks():
 )
 def test_closed_loops_beside_the_nonlinear_program(monkeypatch, changes, failing):
     """The full run's checks fail too: where `mh-qp` hardly solves its QPs, or takes its time."""
-    whole, part = load_cycle("nycc"), slice(60, 141)
+    whole, part = load_cycle("nycc"), slice(250, 331)
     short = Cycle("short", np.arange(81.0), whole.speed_mps[part], whole.grade[part])
     monkeypatch.setattr(nlp_checks, "cycle_names", lambda: ("short",))
     monkeypatch.setattr(Context, "trip", lambda self, _: Trip(short, self.vehicle))

@@ -1,11 +1,14 @@
-"""The least of one stage at given prices, in closed form, and how it responds to them."""
+"""The running engine at given prices: the least of a second or stage, and how it responds to them.
+
+The same in C: codegen/runtime/mpc_priced.h.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from qpmpc.costate.curves import Curves
+from qpmpc.pwa.curves import Curves
 
 Floats = NDArray[np.float64]
 
@@ -51,7 +54,7 @@ def least(
         P_i = U^2 (1 - 1 / r_i^2) / (4 R),  R of discharge for r_i > 1, else of charge
 
     so that E_i = P0 - P_i, clipped to the piece and the limits; the least of all pieces is the
-    least of the stage, whatever the shape of f, because l is convex.
+    least of the stage, whatever the shape of f, because l is convex. The last piece goes on.
 
     Parameters
     ----------
@@ -66,7 +69,7 @@ def least(
     ohm = np.where(ratio > 1.0, curves.discharge_ohm, curves.charge_ohm)
     free = net_w[:, None] - curves.square_v2 * (1.0 - 1.0 / ratio**2) / (4.0 * ohm)
     begin = np.maximum(curves.begin_w, low_w[:, None])
-    end = np.minimum(curves.end_w, high_w[:, None])
+    end = np.minimum(np.append(curves.end_w[:-1], np.inf), high_w[:, None])
     power = np.minimum(np.maximum(free, begin), end)
     internal = curves.internal_w(net_w[:, None] - power)
     cost = marginal * power + price_fuel[:, None] * curves.intercept

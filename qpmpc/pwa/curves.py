@@ -37,9 +37,22 @@ class Curves:
     charge_ohm: float
 
     @classmethod
-    def of(cls, vehicle: Vehicle, line: OptimalLine) -> "Curves":
-        """Make the curves of a vehicle with this optimal line."""
-        kept = chords(line.power_w, line.fuel_g_per_s, FUEL_TOLERANCE_G_PER_S)
+    def of(
+        cls,
+        vehicle: Vehicle,
+        line: OptimalLine,
+        tolerance_g_per_s: float = FUEL_TOLERANCE_G_PER_S,
+        knee_w: float = np.inf,
+    ) -> "Curves":
+        """Make the curves of a vehicle with this optimal line.
+
+        Parameters
+        ----------
+        vehicle, line : car, and line of its engine
+        tolerance_g_per_s, knee_w : of the chords; beyond this power times (P / knee)^2
+        """
+        allowed = tolerance_g_per_s * np.maximum(line.power_w / knee_w, 1.0) ** 2
+        kept = chords(line.power_w, line.fuel_g_per_s, allowed)
         maps, soc = BatteryMaps(vehicle.battery), vehicle.trip.soc_mean
         square_v2 = maps.open_circuit.at(soc) ** 2
         ohms = maps.discharge.at(soc), maps.charge.at(soc)
@@ -95,20 +108,24 @@ def _lies_above(x: Floats, y: Floats, one: int, between: int, other: int) -> boo
     return bool(y[between] >= y[one] + slope * (x[between] - x[one]))
 
 
-def chords(x: Floats, y: Floats, tolerance: float) -> NDArray[np.intp]:
+def chords(x: Floats, y: Floats, tolerance: Floats) -> NDArray[np.intp]:
     """Return points of a sampled curve whose chords stay within `tolerance` of all samples.
 
     From each point to the furthest one that the samples between allow; shape (pieces + 1,).
+
+    Parameters
+    ----------
+    x, y, tolerance : at each sample, shape (m,)
     """
     kept, here = [0], 0
     while here < len(x) - 1:
         low, high, furthest = -np.inf, np.inf, here + 1
         for there in range(here + 1, len(x)):
             run = x[there] - x[here]
-            slope = (y[there] - y[here]) / run
+            slope, room = (y[there] - y[here]) / run, tolerance[there] / run
             if low <= slope <= high:
                 furthest = there
-            low, high = max(low, slope - tolerance / run), min(high, slope + tolerance / run)
+            low, high = max(low, slope - room), min(high, slope + room)
             if low > high:
                 break
         kept.append(furthest)
