@@ -69,7 +69,7 @@ static inline least least_shared(const mpc_costate_part *part, const stage_price
     const mpc_real inverse = REAL(1.0) / ratio;
     const mpc_real square = inverse * inverse;
     const mpc_real quarter = quarter_w((ratio > REAL(1.0)) ? 1 : 0);
-    const mpc_real own_w = net_w - (quarter * (REAL(1.0) - square));
+    const mpc_real own_w = stationary_w(net_w, ratio);
     const mpc_real free_w = real_max(own_w, row[BEGIN]);
     const mpc_real power_w = real_clip(free_w, part->low_w, part->high_w);
     const mpc_real given = REAL(2.0) * quarter * square * inverse * price->per;
@@ -128,10 +128,7 @@ void mpc_costate_minimise_exactly(mpc_stage *stage, int32_t which)
         const mpc_real begin = real_max(mpc_par.line_begin_w[i], part->low_w);
         const mpc_real end = real_min(mpc_par.line_end_w[i], part->high_w);
         const mpc_real ratio = ratio_at(&price, slope);
-        const mpc_real inverse = REAL(1.0) / ratio;
-        const mpc_real quarter = quarter_w((ratio > REAL(1.0)) ? 1 : 0);
-        const mpc_real own_w = net_w - (quarter * (REAL(1.0) - (inverse * inverse)));
-        const mpc_real power_w = real_min(real_max(own_w, begin), end);
+        const mpc_real power_w = real_min(real_max(stationary_w(net_w, ratio), begin), end);
         const mpc_real fuel = (slope * power_w) + mpc_par.line_intercept[i];
         const mpc_real internal = internal_w(net_w - power_w);
         const mpc_real cost = (price.fuel * fuel) + (price.power * power_w)

@@ -11,8 +11,8 @@
 
 /* The engine's line, or the curve learned. */
 #if MPC_LEARNING
-#define LINE_SLOPE(i) (state->learned.slope[i])
-#define LINE_INTERCEPT(i) (state->learned.intercept[i])
+#define LINE_SLOPE(i) FUEL_SLOPE(i)
+#define LINE_INTERCEPT(i) FUEL_INTERCEPT(i)
 #define LINE_SCALE REAL(1.0)
 #else
 #define LINE_SLOPE(i) (mpc_par.line_slope[i])
@@ -47,10 +47,7 @@ mpc_prices mpc_polish_prices(const mpc_state *state)
 static mpc_real power_on(const stage_prices *price, mpc_real net_w, int32_t piece, mpc_real slope,
                          mpc_real low_w, mpc_real high_w)
 {
-    const mpc_real ratio = ratio_at(price, slope);
-    const mpc_real inverse = REAL(1.0) / ratio;
-    const mpc_real quarter = quarter_w((ratio > REAL(1.0)) ? 1 : 0);
-    const mpc_real own_w = net_w - (quarter * (REAL(1.0) - (inverse * inverse)));
+    const mpc_real own_w = stationary_w(net_w, ratio_at(price, slope));
     return real_min(real_max(own_w, real_max(mpc_par.line_begin_w[piece], low_w)),
                     real_min(mpc_par.line_end_w[piece], high_w));
 }

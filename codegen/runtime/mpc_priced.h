@@ -36,6 +36,13 @@ static inline mpc_real quarter_w(int32_t discharges)
     return pick(discharges, mpc_par.quarter_discharge_w, mpc_par.quarter_charge_w);
 }
 
+/* Power of the engine at which the slope of l is r */
+static inline mpc_real stationary_w(mpc_real net_w, mpc_real ratio)
+{
+    const mpc_real inverse = REAL(1.0) / ratio;
+    return net_w - (quarter_w((ratio > REAL(1.0)) ? 1 : 0) * (REAL(1.0) - (inverse * inverse)));
+}
+
 /* 1 - 4 R P / U^2 */
 static inline mpc_real under_root(mpc_real power_w)
 {

@@ -38,6 +38,14 @@ class Least(NamedTuple):
     gives: Floats
 
 
+class _Pieces(NamedTuple):
+    """Each piece of f as if it went on for ever, shape (n, pieces) each: E_i, r_i, dE_i."""
+
+    power_w: Floats
+    ratio: Floats
+    gives: Floats
+
+
 def least(
     curves: Curves,
     net_w: Floats,
@@ -63,30 +71,26 @@ def least(
     low_w, high_w : limits of E, low <= high, shape (n,)
     price_fuel, price_power, price_internal : w_F, w_E, w_G >= 0, shape (n,)
     """
-    w_internal = np.maximum(price_internal, LEAST_PRICE)[:, None]
-    marginal = price_fuel[:, None] * curves.slope + price_power[:, None]
-    ratio = np.maximum(marginal / w_internal, LEAST_RATIO)
-    ohm = np.where(ratio > 1.0, curves.discharge_ohm, curves.charge_ohm)
-    free = net_w[:, None] - curves.square_v2 * (1.0 - 1.0 / ratio**2) / (4.0 * ohm)
+    each = _on_each_piece(curves, net_w, price_fuel, price_power, price_internal)
+    free = each.power_w
     begin = np.maximum(curves.begin_w, low_w[:, None])
     end = np.minimum(np.append(curves.end_w[:-1], np.inf), high_w[:, None])
     power = np.minimum(np.maximum(free, begin), end)
     internal = curves.internal_w(net_w[:, None] - power)
-    cost = marginal * power + price_fuel[:, None] * curves.intercept
+    fuel = curves.slope * power + curves.intercept
+    cost = price_fuel[:, None] * fuel + price_power[:, None] * power
     cost += price_internal[:, None] * internal
     cost = np.where(begin <= end, cost, np.inf)
     best = (np.arange(len(net_w)), cost.argmin(axis=1))
     inside = (free > begin) & (free < end)
-    gives = np.where(inside, curves.square_v2 / (2.0 * ohm * ratio**3 * w_internal), 0.0)
-    slope = curves.slope[best[1]]
     return Least(
         power[best],
-        slope * power[best] + curves.intercept[best[1]],
+        fuel[best],
         internal[best],
         cost[best],
-        slope,
-        ratio[best],
-        gives[best],
+        curves.slope[best[1]],
+        each.ratio[best],
+        np.where(inside, each.gives, 0.0)[best],
     )
 
 
@@ -104,21 +108,31 @@ def least_convex(
     It is the first one whose E_i, within the limits, does not lie beyond its end. Parameters as of
     `least`.
     """
-    w_internal = np.maximum(price_internal, LEAST_PRICE)
-    per = 1.0 / w_internal[:, None]
-    ratio = (price_fuel[:, None] * curves.slope + price_power[:, None]) * per
-    ratio = np.maximum(ratio, LEAST_RATIO)
-    ohm = np.where(ratio > 1.0, curves.discharge_ohm, curves.charge_ohm)
-    free = net_w[:, None] - curves.square_v2 / (4.0 * ohm) * (1.0 - 1.0 / ratio**2)
+    each = _on_each_piece(curves, net_w, price_fuel, price_power, price_internal)
+    free = each.power_w
     kept = np.minimum(np.maximum(free[:, :-1], low_w[:, None]), high_w[:, None])
     is_beyond = kept > curves.end_w[:-1]
     best = (np.arange(len(net_w)), is_beyond.cumprod(axis=1).sum(axis=1))
     own, begin = free[best], curves.begin_w[best[1]]
     power = np.minimum(np.maximum(np.maximum(own, begin), low_w), high_w)
     inside = (own > np.maximum(begin, low_w)) & (own < high_w)
-    gives = curves.square_v2 / (2.0 * ohm[best] * ratio[best] ** 3 * w_internal)
+    gives = np.where(inside, each.gives[best], 0.0)
     slope = curves.slope[best[1]]
     fuel = slope * power + curves.intercept[best[1]]
     internal = curves.internal_w(net_w - power)
     cost = price_fuel * fuel + price_power * power + price_internal * internal
-    return Least(power, fuel, internal, cost, slope, ratio[best], np.where(inside, gives, 0.0))
+    return Least(power, fuel, internal, cost, slope, each.ratio[best], gives)
+
+
+def _on_each_piece(
+    curves: Curves, net_w: Floats, price_fuel: Floats, price_power: Floats, price_internal: Floats
+) -> _Pieces:
+    """Return where the slope of l is r_i, on each piece; parameters as of `least`."""
+    w_internal = np.maximum(price_internal, LEAST_PRICE)[:, None]
+    ratio = (price_fuel[:, None] * curves.slope + price_power[:, None]) / w_internal
+    ratio = np.maximum(ratio, LEAST_RATIO)
+    quarter_w = curves.square_v2 / (
+        4.0 * np.where(ratio > 1.0, curves.discharge_ohm, curves.charge_ohm)
+    )
+    power_w = net_w[:, None] - quarter_w * (1.0 - 1.0 / ratio**2)
+    return _Pieces(power_w, ratio, 2.0 * quarter_w / (ratio**3 * w_internal))
