@@ -368,7 +368,7 @@ static void fill_short(const mpc_road *seen, mpc_in *in)
 }
 
 /* What is kept at the end of a block: that of the place where it ends; nothing, if it is empty. From the
- * upper limit no more than a share of it beyond what there is a use for. At arrival the memory is not
+ * upper limit no more than there is a use for. At arrival the memory is not
  * looked at, which may be that of no forecast. */
 static mpc_swing kept_of(const mpc_forecast *forecast, int32_t block, int32_t is_arriving)
 {
@@ -380,8 +380,7 @@ static mpc_swing kept_of(const mpc_forecast *forecast, int32_t block, int32_t is
             kept = forecast->swing[(end - 1) / forecast->place_s];
             const mpc_real use_j =
                 forecast->use_j[(end - 1) / spacing_s(forecast, MPC_STRETCHES, MPC_STRETCH_S)];
-            const mpc_real used_j = use_j + (SURE_SHARE * kept.rise_j);
-            kept.rise_j = real_max(real_min(kept.rise_j, used_j), LEAST_KEPT_J);
+            kept.rise_j = real_max(real_min(kept.rise_j, use_j), LEAST_KEPT_J);
         }
     }
     return kept;

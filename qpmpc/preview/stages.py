@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from qpmpc.preview.forecast import Trace, internal_off_w
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.preview.place import forecast_seconds
-from qpmpc.preview.swing import LEAST_KEPT_J, NO_LIMIT_J, SURE_SHARE, drops, rooms, swings, uses
+from qpmpc.preview.swing import LEAST_KEPT_J, NO_LIMIT_J, drops, rooms, swings, uses
 from qpmpc.vehicle.must_run import begun_s, must_run, too_fast, whole_runs
 from qpmpc.vehicle.parameters import Vehicle
 
@@ -241,10 +241,9 @@ class StageBuilder:
     def _kept_j(self, edges: NDArray[np.intp]) -> NDArray[np.float64]:
         """Kept from the SOC limits at the end of each block: that of the place where it ends.
 
-        From the upper limit no more than has a use (`uses`) about the block's last second, U, and a
-        share of the place's rise:
+        From the upper limit no more than has a use (`uses`) about the block's last second, U:
 
-            min(rise, U + `SURE_SHARE` rise)
+            min(rise, U)
 
         Returns
         -------
@@ -252,8 +251,7 @@ class StageBuilder:
         """
         last = np.maximum(edges[1:] - 1, 0)
         kept_j = self._swing_j[:, last // max(self._place_s, 1)]
-        most_j = self._use_j[last] + SURE_SHARE * kept_j[1]
-        kept_j[1] = np.maximum(np.minimum(kept_j[1], most_j), LEAST_KEPT_J)
+        kept_j[1] = np.maximum(np.minimum(kept_j[1], self._use_j[last]), LEAST_KEPT_J)
         return np.repeat(kept_j * (np.diff(edges) > 0), self.settings.classes, axis=1)
 
     def _long_fields(self, edges: NDArray[np.intp]) -> NDArray[np.float64]:

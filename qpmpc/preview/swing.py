@@ -28,11 +28,6 @@ DRAIN_SHARE = 0.8
 FILLED_SHARE = 0.5
 """Of the battery's energy between its limits: no more is kept from either limit. A long descent in
 the cold has no use for more room: the heat that it needs comes from an engine that charges."""
-
-
-SURE_SHARE = 0.2
-"""Of a place's rise, which the end of a block keeps beyond the use that is seen for it: the engine
-does not rest wherever it may."""
 STRETCHES, STRETCH_S = 900, 8
 """Of the trip, each so long or longer in a trip of over two hours: in one `uses` is one number."""
 

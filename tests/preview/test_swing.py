@@ -18,7 +18,6 @@ from qpmpc.preview.swing import (
     NO_LIMIT_J,
     STRETCH_S,
     STRETCHES,
-    SURE_SHARE,
     drops,
     rooms,
     swings,
@@ -135,7 +134,7 @@ def test_soc_is_limited_at_the_ends_of_blocks_that_lie_ahead(step, short, blocks
     edges = layout.edges(min(step + short, NYCC.steps), NYCC.steps)
     of_end = swings(NYCC, CAR, layout, start, end)[:, (edges[1:] - 1) // length]
     use_j = uses(*(of(NYCC, CAR, layout) for of in (rooms, drops)))[edges[1:] - 1]
-    most_j = np.maximum(use_j + SURE_SHARE * of_end[1], LEAST_KEPT_J)
+    most_j = np.maximum(use_j, LEAST_KEPT_J)
     of_end[1] = np.minimum(of_end[1], most_j)
     ahead = np.diff(edges) > 0
     room_j = rooms(NYCC, CAR, layout)[step + short] if step + short < NYCC.steps else 0.0
@@ -238,12 +237,16 @@ def test_no_room_is_kept_where_no_use_for_it_is_seen(monkeypatch) -> None:
         "trip.soc_init": 0.726251,
         "trip.t_cl_init_degc": 57.762471,
     }
-    fuel_g = {}
-    for share in (1.0, SURE_SHARE):
-        monkeypatch.setattr("qpmpc.preview.stages.SURE_SHARE", share)
+
+    def fuel_g() -> float:
         run = simulate("train-076", "mh-qp", vehicle="prius-liion", settings=of_trip)
-        fuel_g[share] = run.fuel_soc_balanced_g
-    assert fuel_g[SURE_SHARE] < 0.993 * fuel_g[1.0]
+        return run.fuel_soc_balanced_g
+
+    now_g = fuel_g()
+    monkeypatch.setattr(
+        "qpmpc.preview.stages.uses", lambda room_j, _: np.full(len(room_j) - 1, ROOM_J)
+    )
+    assert now_g < 0.993 * fuel_g()
 
 
 @pytest.mark.parametrize(("controller", "of"), [("mh-qp", "mh_qp"), ("mh-costate", "mh_costate")])
