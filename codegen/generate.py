@@ -50,6 +50,7 @@ OF_QP = OF_STARTS | {
     "mpc_qp_method.c",
     "mpc_polish.c",
     "mpc_empty_battery.c",
+    "mpc_full_battery.c",
     "mpc_heating_run.c",
 }
 

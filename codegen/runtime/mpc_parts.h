@@ -72,6 +72,9 @@ mpc_real mpc_polish_power_w(const mpc_state *state, const mpc_prices *prices, in
                             mpc_real planned_w);
 mpc_going mpc_polish_going(const mpc_state *state, const mpc_prices *prices, int32_t k);
 
+/* mpc_full_battery.c: the most power of the coming second for which the battery has room. */
+mpc_real mpc_full_battery_w(const mpc_state *state, const mpc_prices *prices);
+
 /* Where the coming second runs beside the plan, at its least-cost power power_w (mpc_polish.c); 0
  * elsewhere. mpc_empty_battery.c: where the battery or the ramp needs the engine, with the ramp's power
  * at least. mpc_last_run.c: where a run goes on for all that the plan still wants, or begins for it in

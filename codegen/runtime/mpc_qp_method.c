@@ -73,7 +73,8 @@ void mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p_eng
     if (on_share[0] >= real_min(state->cal.on_threshold, STAY_SHARE)) {
         const mpc_real share = real_min(on_share[0], REAL(1.0));
         const mpc_prices prices = mpc_polish_prices(state);
-        p_eng_w[0] = share * mpc_polish_power_w(state, &prices, 0, p_eng_w[0] / share);
+        const mpc_real own_w = mpc_polish_power_w(state, &prices, 0, p_eng_w[0] / share);
+        p_eng_w[0] = share * real_min(own_w, mpc_full_battery_w(state, &prices));
     }
 }
 
@@ -90,7 +91,8 @@ mpc_real mpc_method_least_w(const mpc_state *state)
     const mpc_real power_w = mpc_polish_power_w(state, &prices, 0, REAL(0.0));
 #endif
     const mpc_real ramp_w = mpc_ramp_least_w(state);
-    mpc_real least_w = real_max(ramp_w, mpc_empty_battery_w(state, power_w, ramp_w));
+    const mpc_real fitting_w = real_min(power_w, mpc_full_battery_w(state, &prices));
+    mpc_real least_w = real_max(ramp_w, mpc_empty_battery_w(state, fitting_w, ramp_w));
 #if MPC_STARTS
     least_w = real_max(least_w, mpc_last_run_w(state, &prices, &second[0]));
     least_w = real_max(least_w, mpc_last_start_w(state, &prices, second));

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from qpmpc.controllers.battery_run import battery_run_w
 from qpmpc.controllers.empty_battery import empty_battery_w
+from qpmpc.controllers.full_battery import full_battery_w
 from qpmpc.controllers.heating_run import heating_run_w
 from qpmpc.controllers.monitor import Flag
 from qpmpc.controllers.qp_certificate import certificate_of
@@ -186,10 +187,11 @@ class QpPlanner(Planner):
             prices, stages = self.qp.prices(solved.duals), solved.stages
             vehicle, polish, x = self.trip.vehicle, self._polish, solved.x
             net_w = float(stages.net_w[0])
-            if on_share[0] >= STAY_SHARE:
-                power_w[0] = polish.power_w(prices, net_w, float(power_w[0]))
-            cheapest_w = polish.power_w(prices, net_w, 0.0)
             battery, maps = vehicle.battery, polish.maps
+            most_w = full_battery_w(vehicle, maps, prices, stages, short.stop, seen)
+            if on_share[0] >= STAY_SHARE:
+                power_w[0] = min(polish.power_w(prices, net_w, float(power_w[0])), most_w)
+            cheapest_w = min(polish.power_w(prices, net_w, 0.0), most_w)
             empty_w = empty_battery_w(battery, maps, net_w, seen.soc, cheapest_w, least_w)
             least_w = max(least_w, empty_w)
             internal_w, engine = x[:, Var.INTERNAL], vehicle.engine
