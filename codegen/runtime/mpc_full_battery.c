@@ -22,7 +22,7 @@ mpc_real mpc_full_battery_w(const mpc_state *state, const mpc_prices *prices)
     const mpc_real room_w = net_w - mpc_map_power_to_reach_w(state->watch.good.soc, full_soc);
     const mpc_real least_w =
         real_max(mpc_par.engine_min_w, net_w - mpc_par.battery_discharge_max_w);
-    const int32_t is_seen =
-        ((gained_j > REAL(0.0)) && (prices->fuel >= FUEL_LEAST) && (mpc_par.polish != 0)) ? 1 : 0;
-    return (is_seen != 0) ? real_max(room_w, least_w) : real_max(mpc_par.engine_max_w, least_w);
+    const mpc_real counts = above(gained_j, REAL(0.0)) * not_below(prices->fuel, FUEL_LEAST);
+    const mpc_real is_seen = (mpc_par.polish != 0) ? counts : REAL(0.0);
+    return real_max(blend(is_seen, room_w, mpc_par.engine_max_w), least_w);
 }

@@ -70,12 +70,13 @@ void mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p_eng
         on_share[k] = state->stage[k].x[MPC_VAR_ON];
         p_eng_w[k] = state->stage[k].x[MPC_VAR_P_ENG];
     }
-    if (on_share[0] >= real_min(state->cal.on_threshold, STAY_SHARE)) {
-        const mpc_real share = real_min(on_share[0], REAL(1.0));
-        const mpc_prices prices = mpc_polish_prices(state);
-        const mpc_real own_w = mpc_polish_power_w(state, &prices, 0, p_eng_w[0] / share);
-        p_eng_w[0] = share * real_min(own_w, mpc_full_battery_w(state, &prices));
-    }
+    /* worked out whether it runs or not, so that every second takes the same instructions */
+    const mpc_real stay_share = real_min(state->cal.on_threshold, STAY_SHARE);
+    const mpc_real share = real_min(real_max(on_share[0], stay_share), REAL(1.0));
+    const mpc_prices prices = mpc_polish_prices(state);
+    const mpc_real own_w = mpc_polish_power_w(state, &prices, 0, p_eng_w[0] / share);
+    const mpc_real polished_w = share * real_min(own_w, mpc_full_battery_w(state, &prices));
+    p_eng_w[0] = pick((on_share[0] >= stay_share) ? 1 : 0, polished_w, p_eng_w[0]);
 }
 
 mpc_real mpc_method_least_w(const mpc_state *state)
