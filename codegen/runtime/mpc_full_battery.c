@@ -18,7 +18,8 @@ mpc_real mpc_full_battery_w(const mpc_state *state, const mpc_prices *prices)
         stored_j -= road->duration_s * road->internal_off_w;
         gained_j = real_max(gained_j, stored_j + road->rise_j);
     }
-    const mpc_real full_soc = soc_max - (gained_j / mpc_map_energy_j(soc_max));
+    const mpc_real empty_soc = state->cal.soc_min + SOC_MARGIN;
+    const mpc_real full_soc = real_max(soc_max - (gained_j / mpc_map_energy_j(soc_max)), empty_soc);
     const mpc_real room_w = net_w - mpc_map_power_to_reach_w(state->watch.good.soc, full_soc);
     const mpc_real least_w =
         real_max(mpc_par.engine_min_w, net_w - mpc_par.battery_discharge_max_w);

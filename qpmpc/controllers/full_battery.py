@@ -9,6 +9,7 @@ The same in C: codegen/runtime/mpc_full_battery.c.
 
 import numpy as np
 
+from qpmpc.controllers.safety import SOC_MARGIN
 from qpmpc.preview.stages import Stages
 from qpmpc.qp.last_run import FUEL_LEAST
 from qpmpc.qp.polish import Prices
@@ -36,10 +37,12 @@ def full_battery_w(
     braking beyond (`qpmpc.preview.swing.rooms`). If J > 0, the second is not to lead beyond
     SOC_max - J / E_bat, with E_bat at the voltage of the limit:
 
-        E <= P0 - P_reach(SOC, SOC_max - J / E_bat, 1 s)
+        E <= P0 - P_reach(SOC, max(SOC_max - J / E_bat, SOC_min + `SOC_MARGIN`), 1 s)
 
     or the least that an engine may give there, if that is more. Nothing is seen where fuel is
-    wanted for its heat, w_F < `FUEL_LEAST`.
+    wanted for its heat, w_F < `FUEL_LEAST`, nor by a short horizon of one second. The planner
+    holds to it the polished power and that of `empty_battery_w`; where the ramp or a run that
+    goes on or begins asks for more, the second gets that.
 
     Parameters
     ----------
@@ -55,5 +58,6 @@ def full_battery_w(
     if gained_j <= 0.0 or prices.fuel < FUEL_LEAST:
         return np.inf
     full_soc = battery.soc_max - gained_j / maps.energy_j(battery.soc_max)
+    full_soc = max(full_soc, battery.soc_min + SOC_MARGIN)
     room_w = net_w - maps.power_to_reach_w(seen.soc, full_soc, STEP_S)
     return max(room_w, vehicle.engine.power_min_w, net_w - vehicle.battery_discharge_max_w)

@@ -243,7 +243,7 @@ class StageBuilder:
 
         From the upper limit no more than has a use (`uses`) about the block's last second, U:
 
-            min(rise, U)
+            max(min(rise, U), `LEAST_KEPT_J`)
 
         Returns
         -------
