@@ -154,30 +154,30 @@ def test_it_begins_where_it_costs_least(net_w, spare_j, run_s, seconds) -> None:
     assert found == (going(net_w[0]).power_w if of_start[0] < best_g - SAME_G else 0.0)
 
 
-ROAD = "random-7477-129s"
+ROAD, NIMH = "random-8606-215s", load_vehicle("prius-nimh")
 OF_ROAD = {
-    "thermal.t_amb_degc": -3.286084,
-    "trip.soc_init": 0.408489,
-    "trip.t_cl_init_degc": 50.765561,
+    "thermal.t_amb_degc": 6.752213,
+    "trip.soc_init": 0.415229,
+    "trip.t_cl_init_degc": 80.399723,
 }
 
 
 def drive(made_in: str) -> Trajectory:
-    return drive_in(made_in, ROAD, "prius-liion", OF_ROAD)
+    return drive_in(made_in, ROAD, NIMH.name, OF_ROAD)
 
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 def test_it_spares_a_start_just_before_braking_in_c_as_in_python(monkeypatch) -> None:
-    """Two minutes near the limit: four starts instead of three, and 3 % more."""
+    """Four minutes near the limit: eight starts instead of the optimum's six, and 3.3 % more."""
     now, in_c = drive("python"), drive("c")
     monkeypatch.setattr("qpmpc.controllers.qp_planner.battery_run_w", lambda *_: 0.0)
     before = drive("python")
     assert_same_commands(now, in_c)
-    assert now.started.sum() == before.started.sum() - 1
-    soc_g = 164.0  # of a unit of SOC: dynamic programming's own on this trip
+    assert now.started.sum() == before.started.sum() - 2
+    soc_g = 240.0  # of a unit of SOC: dynamic programming's own on this trip
     fuel_g = [run.fuel_g.sum() - soc_g * (run.soc[-1] - run.soc[0]) for run in (now, before)]
-    assert fuel_g[0] < 0.98 * fuel_g[1]
-    assert now.soc.min() >= CAR.battery.soc_min
+    assert fuel_g[0] < 0.97 * fuel_g[1]
+    assert now.soc.min() >= NIMH.battery.soc_min
 
 
 def test_a_steady_road_near_the_limit_takes_no_more_starts(monkeypatch) -> None:
