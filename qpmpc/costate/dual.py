@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from qpmpc.costate.funnel import funnel
 from qpmpc.costate.program import Program
 from qpmpc.pwa.curves import Curves
-from qpmpc.pwa.priced import Least, least, least_convex
+from qpmpc.pwa.priced import Least, StagePrices, least, least_convex
 
 Floats = NDArray[np.float64]
 
@@ -133,9 +133,9 @@ class StageCosts:
         nu = coolant_costate(p, at.heat)
         price_internal = at.charge * p.charge_per_w
         minimised = least_convex if curves is p.shared else least
-        prices = p.fuel_cost - nu * p.per_fuel, nu * p.per_power, price_internal
-        on = minimised(curves, p.net_w, p.low_w, p.high_w, *prices)
-        forced = minimised(curves, p.forced_net_w, p.forced_low_w, p.forced_high_w, *prices)
+        prices = StagePrices(p.fuel_cost - nu * p.per_fuel, nu * p.per_power, price_internal)
+        on = minimised(curves, p.net_w, p.low_w, p.high_w, prices)
+        forced = minimised(curves, p.forced_net_w, p.forced_low_w, p.forced_high_w, prices)
         start = p.start_fuel_g + at.charge * p.cranking_soc - nu * p.start_k
         off = p.free * price_internal * p.off_w
         return cls(

@@ -38,6 +38,14 @@ class Least(NamedTuple):
     gives: Floats
 
 
+class StagePrices(NamedTuple):
+    """What the rates of each stage cost, shape (n,) each: w_F, w_E and w_G >= 0."""
+
+    fuel: Floats
+    power: Floats
+    internal: Floats
+
+
 class _Pieces(NamedTuple):
     """Each piece of f as if it went on for ever, shape (n, pieces) each: E_i, r_i, dE_i."""
 
@@ -46,15 +54,7 @@ class _Pieces(NamedTuple):
     gives: Floats
 
 
-def least(
-    curves: Curves,
-    net_w: Floats,
-    low_w: Floats,
-    high_w: Floats,
-    price_fuel: Floats,
-    price_power: Floats,
-    price_internal: Floats,
-) -> Least:
+def least(curves: Curves, net_w: Floats, low_w: Floats, high_w: Floats, at: StagePrices) -> Least:
     """Minimise  w_F f(E) + w_E E + w_G l(P0 - E)  over low <= E <= high, exactly.
 
     On piece i of f the slope of l has to be r_i = (w_F a_i + w_E) / w_G, at the battery power
@@ -69,17 +69,17 @@ def least(
     curves : f and l
     net_w : P0, shape (n,)
     low_w, high_w : limits of E, low <= high, shape (n,)
-    price_fuel, price_power, price_internal : w_F, w_E, w_G >= 0, shape (n,)
+    at : prices
     """
-    each = _on_each_piece(curves, net_w, price_fuel, price_power, price_internal)
+    each = _on_each_piece(curves, net_w, at)
     free = each.power_w
     begin = np.maximum(curves.begin_w, low_w[:, None])
     end = np.minimum(np.append(curves.end_w[:-1], np.inf), high_w[:, None])
     power = np.minimum(np.maximum(free, begin), end)
     internal = curves.internal_w(net_w[:, None] - power)
     fuel = curves.slope * power + curves.intercept
-    cost = price_fuel[:, None] * fuel + price_power[:, None] * power
-    cost += price_internal[:, None] * internal
+    cost = at.fuel[:, None] * fuel + at.power[:, None] * power
+    cost += at.internal[:, None] * internal
     cost = np.where(begin <= end, cost, np.inf)
     best = (np.arange(len(net_w)), cost.argmin(axis=1))
     inside = (free > begin) & (free < end)
@@ -95,20 +95,14 @@ def least(
 
 
 def least_convex(
-    curves: Curves,
-    net_w: Floats,
-    low_w: Floats,
-    high_w: Floats,
-    price_fuel: Floats,
-    price_power: Floats,
-    price_internal: Floats,
+    curves: Curves, net_w: Floats, low_w: Floats, high_w: Floats, at: StagePrices
 ) -> Least:
     """Minimise as `least` does, for a convex f: there is one piece that the least lies on.
 
     It is the first one whose E_i, within the limits, does not lie beyond its end. Parameters as of
     `least`.
     """
-    each = _on_each_piece(curves, net_w, price_fuel, price_power, price_internal)
+    each = _on_each_piece(curves, net_w, at)
     free = each.power_w
     kept = np.minimum(np.maximum(free[:, :-1], low_w[:, None]), high_w[:, None])
     is_beyond = kept > curves.end_w[:-1]
@@ -120,16 +114,14 @@ def least_convex(
     slope = curves.slope[best[1]]
     fuel = slope * power + curves.intercept[best[1]]
     internal = curves.internal_w(net_w - power)
-    cost = price_fuel * fuel + price_power * power + price_internal * internal
+    cost = at.fuel * fuel + at.power * power + at.internal * internal
     return Least(power, fuel, internal, cost, slope, each.ratio[best], gives)
 
 
-def _on_each_piece(
-    curves: Curves, net_w: Floats, price_fuel: Floats, price_power: Floats, price_internal: Floats
-) -> _Pieces:
+def _on_each_piece(curves: Curves, net_w: Floats, at: StagePrices) -> _Pieces:
     """Return where the slope of l is r_i, on each piece; parameters as of `least`."""
-    w_internal = np.maximum(price_internal, LEAST_PRICE)[:, None]
-    ratio = (price_fuel[:, None] * curves.slope + price_power[:, None]) / w_internal
+    w_internal = np.maximum(at.internal, LEAST_PRICE)[:, None]
+    ratio = (at.fuel[:, None] * curves.slope + at.power[:, None]) / w_internal
     ratio = np.maximum(ratio, LEAST_RATIO)
     quarter_w = curves.square_v2 / (
         4.0 * np.where(ratio > 1.0, curves.discharge_ohm, curves.charge_ohm)

@@ -16,7 +16,7 @@ from qpmpc.preview.stages import Stages
 from qpmpc.pwa.curves import Curves
 from qpmpc.pwa.fit import PwaFit
 from qpmpc.pwa.model import PwaModel
-from qpmpc.pwa.priced import Least, least
+from qpmpc.pwa.priced import Least, StagePrices, least
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.parameters import Vehicle
 
@@ -116,8 +116,9 @@ class Polish:
         if not prices.internal > 0.0:
             low_w = high_w = planned_w
             prices = prices._replace(internal=1.0)
-        of_one = (np.array([each]) for each in (net_w, low_w, high_w, *prices))
-        return least(self.curves, *of_one)
+        net, low, high = (np.array([each]) for each in (net_w, low_w, high_w))
+        at = StagePrices(*(np.array([each]) for each in prices))
+        return least(self.curves, net, low, high, at)
 
     def going_in(self, prices: Prices, stages: Stages, k: int) -> Going:
         """Return the k-th of the coming seconds."""

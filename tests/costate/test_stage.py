@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qpmpc.pwa.curves import FUEL_TOLERANCE_G_PER_S, Curves, chords
-from qpmpc.pwa.priced import least
+from qpmpc.pwa.priced import StagePrices, least
 from qpmpc.vehicle import load_vehicle
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.engine import optimal_line
@@ -41,8 +41,8 @@ def test_no_power_costs_less(made, net, share, width, data):
     net = min(net, low + strongest)
     high = low + width * (most - low)
     one = np.ones(1)
-    prices = w["fuel"] * one, w["power"] * one, w["internal"] * one
-    found = least(made, net * one, low * one, high * one, *prices)
+    prices = StagePrices(w["fuel"] * one, w["power"] * one, w["internal"] * one)
+    found = least(made, net * one, low * one, high * one, prices)
     power = np.linspace(low, high, 3001)
     internal = made.internal_w(net - power)
     cost = w["fuel"] * made.fuel_g_per_s(power) + w["power"] * power + w["internal"] * internal
