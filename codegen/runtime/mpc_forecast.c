@@ -190,7 +190,8 @@ static mpc_real most_kept_j(void)
 }
 
 /* At the end of each place: a share of the swing in it and in the next, at most half of the room
- * between the limits and at least something, by which the end of a block is known. An averaged
+ * between the limits and at least something, by which the end of a block is known; from the lower
+ * limit less of it, because there the engine can help. An averaged
  * preview knows nothing of the swing. */
 static void find_swings(mpc_forecast *forecast)
 {
@@ -200,8 +201,8 @@ static void find_swings(mpc_forecast *forecast)
     for (int32_t place = MPC_BLOCKS - 1; place >= 0; place--) {
         const mpc_swing own = swing_of(forecast, place * forecast->place_s);
         mpc_swing *const kept = &forecast->swing[place];
-        kept->fall_j =
-            real_max(real_min(share * real_max(own.fall_j, next.fall_j), most_j), LEAST_KEPT_J);
+        const mpc_real fall_j = real_min(share * real_max(own.fall_j, next.fall_j), most_j);
+        kept->fall_j = real_max(FALL_SHARE * fall_j, LEAST_KEPT_J);
         kept->rise_j =
             real_max(real_min(share * real_max(own.rise_j, next.rise_j), most_j), LEAST_KEPT_J);
         next = own;

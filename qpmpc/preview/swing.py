@@ -28,6 +28,8 @@ DRAIN_SHARE = 0.8
 FILLED_SHARE = 0.5
 """Of the battery's energy between its limits: no more is kept from either limit. A long descent in
 the cold has no use for more room: the heat that it needs comes from an engine that charges."""
+FALL_SHARE = 0.5
+"""Of what is kept from the upper limit for a swing, from the lower: there the engine can help."""
 STRETCHES, STRETCH_S = 900, 8
 """Of the trip, each so long or longer in a trip of over two hours: in one `uses` is one number."""
 
@@ -53,8 +55,8 @@ def swings(
         fall_b = s max(fall of path_b, fall of path_b+1),   fall of path = -min path
         rise_b = s max(rise of path_b, rise of path_b+1),   rise of path = max path - max(end, 0)
 
-    each at least `LEAST_KEPT_J` and at most half of the room between the limits. One class has no
-    swing: an averaged preview knows nothing of it.
+    each at most half of the room between the limits, of the fall `FALL_SHARE`, and at least
+    `LEAST_KEPT_J`. One class has no swing: an averaged preview knows nothing of it.
 
     Parameters
     ----------
@@ -71,8 +73,9 @@ def swings(
     is_hard = forecast.demand_w > settings.class_hard_w
     own = np.array([_swing(flow_w[a:b], is_hard[a:b]) for a, b in zip(start, end, strict=True)]).T
     following = np.append(own[:, 1:], np.zeros((2, 1)), axis=1)
-    kept: Floats = np.minimum(settings.swing_share * np.maximum(own, following), _most_j(vehicle))
-    return np.maximum(kept, LEAST_KEPT_J)
+    kept = np.minimum(settings.swing_share * np.maximum(own, following), _most_j(vehicle))
+    found: Floats = np.maximum(np.array([[FALL_SHARE], [1.0]]) * kept, LEAST_KEPT_J)
+    return found
 
 
 def rooms(forecast: Trace, vehicle: Vehicle, settings: HorizonSettings) -> Floats:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.preview import HorizonSettings, StageBuilder, Trace
 from qpmpc.preview.swing import (
+    FALL_SHARE,
     DRAIN_SHARE,
     FILLED_SHARE,
     LEAST_KEPT_J,
@@ -59,7 +60,7 @@ def of_blocks(*blocks: list[float], **changed: float) -> np.ndarray:
 def test_an_engine_in_hard_driving_makes_up_for_the_rest() -> None:
     # -B, -2B, -2B + A, and the hard second leads back to 0
     fall, rise = of_blocks([EASY_W, EASY_W, BRAKING_W, HARD_W])
-    assert fall[0] == pytest.approx(2.0 * EASY_J)
+    assert fall[0] == pytest.approx(FALL_SHARE * 2.0 * EASY_J)
     assert rise[0] == pytest.approx(max(BRAKED_J - 2.0 * EASY_J, LEAST_KEPT_J))
     # A, then two hard seconds take half of A - B each, then B out of the store
     fall, rise = of_blocks([BRAKING_W, HARD_W, HARD_W, EASY_W])
@@ -71,7 +72,7 @@ def test_without_hard_driving_all_seconds_make_up_for_the_rest() -> None:
     fall, rise = of_blocks([EASY_W, EASY_W, BRAKING_W])
     mean = (2.0 * EASY_J - BRAKED_J) / 3.0
     path = [mean - EASY_J, 2.0 * (mean - EASY_J), 0.0]
-    assert fall[0] == pytest.approx(-min(path))
+    assert fall[0] == pytest.approx(FALL_SHARE * -min(path))
     assert rise[0] == pytest.approx(max(*path, LEAST_KEPT_J))
 
 
@@ -79,20 +80,20 @@ def test_the_end_of_a_block_keeps_what_the_next_needs_too() -> None:
     falling, rising = [EASY_W, HARD_W], [BRAKING_W, HARD_W]
     np.testing.assert_allclose(
         of_blocks(falling, rising, falling),
-        [[EASY_J, EASY_J, EASY_J], [BRAKED_J, BRAKED_J, LEAST_KEPT_J]],
+        [[FALL_SHARE * EASY_J] * 3, [BRAKED_J, BRAKED_J, LEAST_KEPT_J]],
     )
 
 
 def test_no_engine_takes_from_the_battery_so_a_descent_ends_above() -> None:
     """It falls no deeper than with the engine at rest, and its own energy is no swing."""
     fall, rise = of_blocks([EASY_W, BRAKING_W, BRAKING_W, BRAKING_W])
-    assert fall[0] == pytest.approx(EASY_J)
+    assert fall[0] == pytest.approx(FALL_SHARE * EASY_J)
     assert rise[0] == LEAST_KEPT_J
     modest_w = 10e3  # hard, and within the battery's power
     hard_j = stored_j(modest_w)
     assert hard_j + 2.0 * EASY_J < 9.0 * BRAKED_J
     fall, rise = of_blocks([EASY_W, EASY_W, modest_w] + 9 * [BRAKING_W])
-    assert fall[0] == pytest.approx(2.0 * EASY_J + hard_j)
+    assert fall[0] == pytest.approx(FALL_SHARE * (2.0 * EASY_J + hard_j))
     assert rise[0] == LEAST_KEPT_J
     fall, rise = of_blocks(9 * [BRAKING_W] + [modest_w, EASY_W])
     assert fall[0] == LEAST_KEPT_J
@@ -101,11 +102,11 @@ def test_no_engine_takes_from_the_battery_so_a_descent_ends_above() -> None:
 
 def test_a_share_is_kept_and_at_most_half_of_the_room() -> None:
     one = of_blocks([EASY_W, HARD_W], swing_share=0.3)
-    np.testing.assert_allclose(one, [[0.3 * EASY_J], [LEAST_KEPT_J]])
+    np.testing.assert_allclose(one, [[FALL_SHARE * 0.3 * EASY_J], [LEAST_KEPT_J]])
     many = int(ROOM_J / min(EASY_J, BRAKED_J)) + 1
     fall, _ = of_blocks([EASY_W] * many + [HARD_W])
     _, rise = of_blocks([BRAKING_W] * many + [HARD_W] * many)
-    assert fall[0] == pytest.approx(0.5 * ROOM_J)
+    assert fall[0] == pytest.approx(FALL_SHARE * 0.5 * ROOM_J)
     assert rise[0] == pytest.approx(0.5 * ROOM_J)
 
 

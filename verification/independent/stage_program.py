@@ -152,7 +152,8 @@ def _kept_j(
             kept = [max(kept[0], -level), max(kept[1], level)]
     volts = float(Equations(vehicle).voltage_v(_mean_soc(vehicle)))
     half = 0.5 * (battery.soc_max - battery.soc_min) * volts * 3600.0 * battery.capacity_ah
-    return [max(min(settings.horizon.swing_share * each, half), 1.0) for each in kept]
+    fall, rise = (min(settings.horizon.swing_share * each, half) for each in kept)
+    return [max(fall / 2.0, 1.0), max(rise, 1.0)]
 
 
 class Expansion(NamedTuple):
