@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.preview import HorizonSettings, StageBuilder, Trace
 from qpmpc.preview.swing import (
-    FALL_SHARE,
     DRAIN_SHARE,
+    FALL_SHARE,
     FILLED_SHARE,
     LEAST_KEPT_J,
     NO_LIMIT_J,
