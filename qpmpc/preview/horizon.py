@@ -25,7 +25,8 @@ class HorizonSettings(BaseModel):
     classes : 3 demand classes per block (hard, easy, braking) or 1 (the mean, as in the paper)
     class_hard_w, class_braking_w : demand above the first is hard, below the second braking
     swing_share : share of the swing that an engine in hard driving leads to, by which the SOC
-        limits at the end of a block are tightened, see `qpmpc.preview.swing`
+        limits at the end of a block are tightened, the lower one by half of it, see
+        `qpmpc.preview.swing`
     rise_share : starts that a block costs, per rise of its demand into a class and per on-share
         there. Less than 1: an engine that runs in part of a class does so in its longest episodes
     entry_share : starts that a block costs, per on-share of its first class that is more than at
