@@ -8,9 +8,9 @@ from qpmpc.codegen.forecast_values import fixed_block_s
 from qpmpc.codegen.shared_values import BEYOND_ALL_W, shared_values
 from qpmpc.codegen.values import CONSTANTS_OF_ALL, Values, of_modules
 from qpmpc.controllers import mh_costate
-from qpmpc.controllers.mh_costate import MhCostateSettings, most_charge_g, unit_g
+from qpmpc.controllers.mh_costate import MhCostateSettings, most_charge_g
 from qpmpc.controllers.settings import RuleBasedSettings
-from qpmpc.costate import certificate, dual, funnel, solve
+from qpmpc.costate import certificate, dual, funnel, program, solve
 from qpmpc.costate.path import Shortest
 from qpmpc.costate.solve import moderate
 from qpmpc.errors import InputError
@@ -81,7 +81,7 @@ def costate_values_of(
         **shared.scalars,
         "moderate_w": moderate_w,
         "moderate_g_per_s": moderate_g_per_s,
-        "cold_charge_g": mh_costate.COLD_CHARGE * unit_g(model),
+        "usual_charge_g": program.USUAL_CHARGE * program.unit_g(model),
         "most_charge_g": most_charge_g(model),
     }
     scalars["cranking_soc"] = scalars["cranking_j"] / scalars["battery_energy_j"]
@@ -97,17 +97,18 @@ def costate_values_of(
         scalars=calibration.without(scalars),
         calibration=calibration,
         arrays=arrays,
-        iterations=settings.rounds,
+        iterations=settings.rounds_of(engine),
         departure_iterations=mh_costate.DEPARTURE_ROUNDS,
         duration_exponent=0.0,
-        counts=shared.counts,
+        counts={"polish": 1, **shared.counts},
         block_s=fixed_block_s(settings.horizon),
         learning=False,
         departure_linearisations=mh_costate.DEPARTURE_LINEARISATIONS,
         warm_up_steps=1,
         constants=CONSTANTS
         | of_modules(
-            (dual, "LEAST_SWITCH_G NEAR_K" + (" START_QUARTER_STEPS" if table.has_start else ""))
+            (program, "LEAST_SWITCH_G LEAST_WORTH"),
+            (dual, "EDGE NEAR_K" + (" START_QUARTER_STEPS" if table.has_start else "")),
         ),
         costate={
             "SHARED_PIECES": len(envelope.slope),
@@ -132,9 +133,7 @@ def _for_bisection(envelope: Curves, stride: int) -> Floats:
 
 def _search(has_start: bool) -> dict[str, tuple[float, Bounds]]:
     """Numbers of the search that are tuned, with their bounds: a tenth of them to ten times."""
-    second, longer = dual.SWITCH_G_PER_S, dual.LONG_SWITCH_G_PER_S
-    if has_start:
-        second, longer = dual.START_SWITCH_G_PER_S, dual.START_LONG_SWITCH_G_PER_S
+    second, longer = program.switches_g_per_s(has_start)
     return {
         "search_least_rise_g": (solve.LEAST_RISE_G, (1e-9, 1e-2)),
         "search_first_share": (solve.FIRST_SHARE, (0.1, solve.MOST_SHARE)),

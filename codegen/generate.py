@@ -45,14 +45,7 @@ OF_BUDGET = "The sizes are the controller's budget: a build that\n * does not fi
 OF_ADMM = {"mpc_admm.c", "mpc_admm.h"}
 OF_COSTATE = ("mpc_costate", "mpc_elementary")
 OF_STARTS = {"mpc_battery_run.c", "mpc_last_run.c", "mpc_short_run.c"}  # if one costs anything
-OF_QP = OF_STARTS | {
-    "mpc_qp.c",
-    "mpc_qp_method.c",
-    "mpc_polish.c",
-    "mpc_empty_battery.c",
-    "mpc_full_battery.c",
-    "mpc_heating_run.c",
-}
+OF_QP = {"mpc_qp.c", "mpc_qp_method.c", "mpc_polish.c"}
 
 Name = TypeVar("Name", bound=str)
 

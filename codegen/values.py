@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from qpmpc.codegen.calibration import Calibration, calibration_of
 from qpmpc.codegen.forecast_values import fixed_block_s
 from qpmpc.codegen.shared_values import Sizes, shared_values
-from qpmpc.controllers import heating_run, monitor, qp_planner, realise, safety
+from qpmpc.controllers import heating_run, last_run, monitor, qp_planner, realise, safety
 from qpmpc.controllers.qp_planner import DEPARTURE_LINEARISATIONS, WARM_UP_STEPS
 from qpmpc.controllers.receding_horizon import PLAN_VALID_STEPS
 from qpmpc.controllers.settings import MhQpSettings, RuleBasedSettings
@@ -18,7 +18,7 @@ from qpmpc.preview import checked, swing
 from qpmpc.pwa import learned_fuel, priced
 from qpmpc.pwa.model import PwaModel
 from qpmpc.pwa.model import learned_fuel as learner_of
-from qpmpc.qp import coolant_floor, last_run, linearisation, polish, relaxation, rows, stage_qp
+from qpmpc.qp import coolant_floor, linearisation, polish, relaxation, rows, stage_qp
 from qpmpc.qp.quantities import pieces_of
 from qpmpc.qp.rows import Rows, Table, table_of
 from qpmpc.qp.stage_qp import qp_parameters
@@ -46,6 +46,12 @@ CONSTANTS_OF_ALL = of_modules(
     (checked, "LONGEST_STAGE_S NEWS SAME_MEANS_W"),
     (swing, "NO_LIMIT_J LEAST_KEPT_J FALL_SHARE DRAIN_SHARE FILLED_SHARE"),
     (coolant_floor, "USABLE ARRIVAL_K"),
+    (heating_run, "IDLING_W BEYOND_K LEAST_GROWTH"),
+    (
+        last_run,
+        "LEAST_GAIN_W WANTED_LEAST FUEL_LEAST MUST_LEAST_S"
+        " START_PAYS START_LEAST START_MOST START_SOON SAME_G",
+    ),
     (qp_planner, "FAILURES_FORGIVEN"),
     (base, "LARGEST_PLAUSIBLE"),
     (demand, "GRAVITY_MPS2 ROAD_LOAD_DEGC"),
@@ -54,12 +60,6 @@ CONSTANTS = CONSTANTS_OF_ALL | of_modules(
     (relaxation, "LEAST_SIZE_W"),
     (stage_qp, "LEAST_COST"),
     (priced, "LEAST_RATIO LEAST_PRICE"),
-    (heating_run, "IDLING_W BEYOND_K LEAST_GROWTH"),
-    (
-        last_run,
-        "LEAST_GAIN_W WANTED_LEAST FUEL_LEAST MUST_LEAST_S"
-        " START_PAYS START_LEAST START_MOST START_SOON SAME_G",
-    ),
     (realise, "STAY_S STAY_SHARE"),
     (rows, "SHORTEST_SCALE_S SIGMA_FORCED COOL_SHARE SOC_KEPT MOOT_G_PER_S"),
 )

@@ -1,4 +1,4 @@
-"""A short trip driven by `mh-qp` in Python or in C, for tests of what it does in single seconds."""
+"""A short trip driven in Python or in C, for tests of what a controller does in single seconds."""
 
 import numpy as np
 
@@ -8,10 +8,12 @@ from qpmpc.trajectory import Trajectory
 Start = dict[str, float]
 
 
-def drive_in(made_in: str, trip: str, vehicle: str, start: Start) -> Trajectory:
-    """Drive from a start, as settings, by an implementation of `mh-qp`."""
-    settings = {**start, "mh_qp.implementation": made_in}
-    return qpmpc.simulate(trip, "mh-qp", vehicle=vehicle, settings=settings).trajectory
+def drive_in(
+    made_in: str, trip: str, vehicle: str, start: Start, controller: str = "mh-qp"
+) -> Trajectory:
+    """Drive from a start, as settings, by an implementation of a controller."""
+    settings = {**start, f"{controller.replace('-', '_')}.implementation": made_in}
+    return qpmpc.simulate(trip, controller, vehicle=vehicle, settings=settings).trajectory
 
 
 def assert_same_commands(run: Trajectory, other: Trajectory) -> None:

@@ -170,7 +170,7 @@ static void go_on(mpc_stage *stage, int32_t which, mpc_real starts_g, way *at)
     const mpc_real wish = real_clip(REAL(0.5) - (difference * p->per_width), REAL(0.0), REAL(1.0));
     const mpc_real share = real_max((REAL(1.0) - p->cannot) * wish, p->must);
     const mpc_real rest = REAL(1.0) - share;
-    const mpc_real turn = above(share * rest, REAL(0.0)) * p->per_width;
+    const mpc_real turn = above(share * rest, EDGE) * p->per_width;
     const mpc_real turn_charge = turn * by_charge;
     dual->share = share;
     dual->of_charge = forced->to_prices.charge + (share * free->to_prices.charge)

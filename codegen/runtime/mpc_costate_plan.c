@@ -84,17 +84,37 @@ int32_t mpc_method_finish(mpc_state *state, int32_t solved)
     return solved & mpc_iterate_usable(state);
 }
 
-/* On-shares are those of the smoothed dual, not of the path. */
-void mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p_eng_w)
+/* What the rates of the coming second cost. */
+static mpc_prices prices_now(const mpc_state *state)
 {
-    for (int32_t k = 0; k < MPC_SHORT; k++) {
-        const mpc_costate_dual *const dual = &state->stage[k].dual[state->search.here];
-        on_share[k] = dual->share;
-        p_eng_w[k] = dual->share * dual->drive[MPC_FREE].power_w;
-    }
+    const mpc_stage_program *const of = &state->stage[0].p.of;
+    const mpc_costate_dual *const dual = &state->stage[0].dual[state->search.here];
+    const mpc_real fuel = of->fuel_cost - (dual->nu * of->per_fuel);
+    const mpc_prices prices = {fuel / state->cal.fuel_scale, dual->nu * of->per_power,
+                               dual->charge * of->charge_per_w};
+    return prices;
 }
 
-mpc_real mpc_method_least_w(const mpc_state *state) { return mpc_ramp_least_w(state); }
+/* On-shares are those of the smoothed dual, not of the path. Each second ahead at its own prices: it is
+ * minimised already. */
+mpc_real mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p_eng_w)
+{
+    mpc_going second[MPC_SHORT];
+    for (int32_t k = 0; k < MPC_SHORT; k++) {
+        const mpc_stage *const stage = &state->stage[k];
+        const mpc_costate_dual *const dual = &stage->dual[state->search.here];
+        const mpc_drive *const on = &dual->drive[MPC_FREE];
+        on_share[k] = dual->share;
+        p_eng_w[k] = dual->share * on->power_w;
+        second[k].power_w = on->power_w;
+        second[k].gain_w = stage->road.internal_off_w - on->internal_w;
+        second[k].dearer = dual->on_g[MPC_FREE] - dual->off_g;
+    }
+    const mpc_prices prices = prices_now(state);
+    const mpc_real room_w = mpc_full_battery_w(state, &prices);
+    p_eng_w[0] = real_min(p_eng_w[0], on_share[0] * room_w);
+    return mpc_coming_least_w(state, &prices, second, room_w);
+}
 
 void mpc_method_report(const mpc_state *state, mpc_out *out)
 {

@@ -30,6 +30,7 @@ static void put_no_part(mpc_stage *stage)
 void mpc_costate_program_fill(mpc_state *state)
 {
     const mpc_calibration cal = state->cal; /* a copy, which nothing else can change */
+    const mpc_real per_usual = REAL(1.0) / (cal.fuel_scale * mpc_par.usual_charge_g);
     mpc_stage_sums sums = {REAL(0.0)};
 #if MPC_STARTS
     mpc_real free_before = REAL(1.0);
@@ -64,7 +65,9 @@ void mpc_costate_program_fill(mpc_state *state)
         }
         const mpc_real per_s = pick((road->duration_s > REAL(1.0)) ? 1 : 0,
                                     cal.search_long_switch_g_per_s, cal.search_switch_g_per_s);
-        p->width = real_max(per_s * road->duration_s * free, LEAST_SWITCH_G);
+        const mpc_real charge_g = state->stage[k].y[MPC_ROW_CHARGE];
+        const mpc_real worth = real_clip(charge_g * per_usual, LEAST_WORTH, REAL(1.0));
+        p->width = real_max(per_s * road->duration_s * free * worth, LEAST_SWITCH_G);
         p->per_width = REAL(1.0) / p->width;
         const mpc_real background = BACKGROUND * p->per_width;
         const mpc_real takes = free * p->of.charge_per_w * mpc_par.moderate_w;

@@ -11,7 +11,7 @@
 /* All memory of this method is in the state: there is nothing to claim. */
 void mpc_method_claim(const mpc_state *state) { (void)state; }
 
-/* What a limit of the coolant cost in the last plan; nothing if that has left it. */
+/* What a limit of the coolant cost in the last plan; nothing if that has left it. The last one stays. */
 static mpc_real heat_near(const mpc_stage *stage)
 {
     const mpc_real heat = stage->y[MPC_ROW_HEAT];
@@ -34,6 +34,7 @@ int32_t mpc_method_check(const mpc_state *state)
 void mpc_method_start(mpc_state *state)
 {
     mpc_search *const search = &state->search;
+    mpc_stage *const last = &state->stage[MPC_STAGES - 1];
     mpc_costate_program_fill(state);
     search->here = 0;
     search->streak = 0;
@@ -44,6 +45,7 @@ void mpc_method_start(mpc_state *state)
         stage->dual[0].charge = stage->y[MPC_ROW_CHARGE];
         stage->dual[0].heat = heat_near(stage);
     }
+    last->dual[0].heat = last->y[MPC_ROW_HEAT];
     mpc_costate_dual_at(state, 0);
 }
 

@@ -23,7 +23,7 @@ static heating_second second_at(const mpc_state *state, mpc_real hot_w, mpc_real
                                 mpc_real power_w)
 {
     const mpc_stage_road *const road = &state->stage[0].road;
-    const mpc_real fuel_w = hot_w * mpc_qp_least_fuel(state, power_w, REAL(1.0));
+    const mpc_real fuel_w = hot_w * least_fuel(state, power_w, REAL(1.0));
     const mpc_real gain_w = road->internal_off_w
                             - mpc_map_planned_internal_w(road->net_w - power_w);
     const mpc_real fuel_g = fuel_w / mpc_par.lhv_j_per_g;
@@ -38,7 +38,7 @@ static mpc_real power_of(const mpc_state *state, mpc_real hot_w, mpc_real heat_w
 {
     const mpc_real inside_w = heat_w / heat_engine_w(REAL(1.0), REAL(0.0));
     mpc_real power_w = REAL(2.0) * mpc_par.engine_max_w; /* more than can be had */
-    for (int32_t i = 0; i < MPC_FUEL_PIECES; i++) {
+    for (int32_t i = 0; i < FUEL_PIECES; i++) {
         const mpc_real above_w = inside_w - (hot_w * FUEL_INTERCEPT(i));
         const mpc_real growth = (hot_w * FUEL_SLOPE(i)) - REAL(1.0);
         const mpc_real of_piece_w = above_w / real_max(growth, LEAST_GROWTH);

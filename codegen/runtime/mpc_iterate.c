@@ -19,7 +19,7 @@ void mpc_iterate_clear(mpc_state *state)
             state->stage[k].y[i] = REAL(0.0);
         }
 #if MPC_COSTATE
-        state->stage[k].y[MPC_ROW_CHARGE] = state->cal.fuel_scale * mpc_par.cold_charge_g;
+        state->stage[k].y[MPC_ROW_CHARGE] = state->cal.fuel_scale * mpc_par.usual_charge_g;
 #endif
     }
     state->origin_soc = REAL(0.0);

@@ -1,7 +1,7 @@
 /* The last run of the engine, of which a plan of shares wants a part: the one before goes on for it, or
  * it begins in time, before nothing but standstill is left.
  *
- * The same in Python, with the rules: qpmpc/qp/last_run.py.
+ * The same in Python, with the rules: qpmpc/controllers/last_run.py.
  */
 #include "mpc_constants.h"
 #include "mpc_model.h"

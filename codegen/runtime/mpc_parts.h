@@ -48,21 +48,18 @@ void mpc_stages_expand_about_plan(mpc_state *state);
  * memory is sound. mpc_method_start: makes the values of a second and starts at the iterate.
  * mpc_method_iterate: iterates; returns 0 if the method itself reports a failure.
  * mpc_method_finish: puts the plan into the iterate; returns whether it is usable.
- * mpc_method_plan: on-share and mean power of the seconds ahead.
- * mpc_method_least_w: power that the coming second gets at least, whatever its on-share. */
+ * mpc_method_plan: on-share and mean power of the seconds ahead; returns the power that the coming
+ * one gets at least, whatever its on-share. */
 void mpc_method_claim(const mpc_state *state);
 int32_t mpc_method_check(const mpc_state *state);
 void mpc_method_start(mpc_state *state);
 int32_t mpc_method_iterate(mpc_state *state, int32_t count);
 int32_t mpc_method_finish(mpc_state *state, int32_t solved);
-void mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p_eng_w);
-mpc_real mpc_method_least_w(const mpc_state *state);
+mpc_real mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p_eng_w);
 void mpc_method_report(const mpc_state *state, mpc_out *out);
 
-/* mpc_qp.c: values of the quadratic program. mpc_qp_least_fuel: least fuel rate of the hot engine that
- * it allows at a mean power and an on-share. */
+/* mpc_qp.c: values of the quadratic program */
 void mpc_qp_update(mpc_state *state);
-mpc_real mpc_qp_least_fuel(const mpc_state *state, mpc_real p_eng_w, mpc_real on);
 mpc_real mpc_qp_relaxation_gap(const mpc_state *state);
 
 /* mpc_polish.c: a second at the plan's prices. mpc_polish_power_w: engine power of second k, of a plan
@@ -74,6 +71,12 @@ mpc_going mpc_polish_going(const mpc_state *state, const mpc_prices *prices, int
 
 /* mpc_full_battery.c: the most power of the coming second for which the battery has room. */
 mpc_real mpc_full_battery_w(const mpc_state *state, const mpc_prices *prices);
+
+/* mpc_coming_second.c: the power that the coming second gets at least by the rules below, of the seconds
+ * ahead with the engine on; of the first alone where a start costs nothing. room_w is that of
+ * mpc_full_battery.c. */
+mpc_real mpc_coming_least_w(const mpc_state *state, const mpc_prices *prices,
+                            const mpc_going *second, mpc_real room_w);
 
 /* Where the coming second runs beside the plan, at its least-cost power power_w (mpc_polish.c); 0
  * elsewhere. mpc_empty_battery.c: where the battery or the ramp needs the engine, with the ramp's power

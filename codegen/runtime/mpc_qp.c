@@ -47,15 +47,6 @@ void mpc_qp_update(mpc_state *state)
     scale_cost(state);
 }
 
-mpc_real mpc_qp_least_fuel(const mpc_state *state, mpc_real p_eng_w, mpc_real on)
-{
-    mpc_real least = (FUEL_SLOPE(0) * p_eng_w) + (FUEL_INTERCEPT(0) * on);
-    for (int32_t i = 1; i < MPC_FUEL_PIECES; i++) {
-        least = real_max(least, (FUEL_SLOPE(i) * p_eng_w) + (FUEL_INTERCEPT(i) * on));
-    }
-    return least;
-}
-
 /* Slack of the relaxed inequalities at the first stage, relative:
  * (|F - F_pwa| LHV + |G - G_pwa|) / max(|F| LHV + |G|, 1 kW); x in SI units. */
 mpc_real mpc_qp_relaxation_gap(const mpc_state *state)
@@ -65,7 +56,7 @@ mpc_real mpc_qp_relaxation_gap(const mpc_state *state)
     const mpc_real p_eng_w = stage->x[MPC_VAR_P_ENG];
     const mpc_real fuel = stage->x[MPC_VAR_FUEL];
     const mpc_real internal_w = stage->x[MPC_VAR_INTERNAL];
-    const mpc_real least_fuel = mpc_qp_least_fuel(state, p_eng_w, on);
+    const mpc_real least_g_per_s = least_fuel(state, p_eng_w, on);
     const mpc_stage_road *const road = &stage->road;
     const mpc_real bat_w = ((on * road->free_net_w) + (road->net_w - road->free_net_w)) - p_eng_w;
     mpc_real least_w = (mpc_par.battery_slope[0] * bat_w) + (mpc_par.battery_intercept[0] * on);
@@ -74,7 +65,7 @@ mpc_real mpc_qp_relaxation_gap(const mpc_state *state)
                                         + (mpc_par.battery_intercept[j] * on));
     }
     least_w += (REAL(1.0) - on) * road->free_internal_off_w;
-    const mpc_real slack_w = (REAL_ABS(fuel - least_fuel) * mpc_par.lhv_j_per_g)
+    const mpc_real slack_w = (REAL_ABS(fuel - least_g_per_s) * mpc_par.lhv_j_per_g)
                              + REAL_ABS(internal_w - least_w);
     const mpc_real size_w = (REAL_ABS(fuel) * mpc_par.lhv_j_per_g) + REAL_ABS(internal_w);
     return slack_w / real_max(size_w, LEAST_SIZE_W);

@@ -64,43 +64,30 @@ int32_t mpc_method_finish(mpc_state *state, int32_t solved)
     return usable;
 }
 
-void mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p_eng_w)
+mpc_real mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p_eng_w)
 {
     for (int32_t k = 0; k < MPC_SHORT; k++) {
         on_share[k] = state->stage[k].x[MPC_VAR_ON];
         p_eng_w[k] = state->stage[k].x[MPC_VAR_P_ENG];
     }
+    const mpc_prices prices = mpc_polish_prices(state);
+    const mpc_real room_w = mpc_full_battery_w(state, &prices);
     /* worked out whether it runs or not, so that every second takes the same instructions */
     const mpc_real stay_share = real_min(state->cal.on_threshold, STAY_SHARE);
     const mpc_real share = real_min(real_max(on_share[0], stay_share), REAL(1.0));
-    const mpc_prices prices = mpc_polish_prices(state);
     const mpc_real own_w = mpc_polish_power_w(state, &prices, 0, p_eng_w[0] / share);
-    const mpc_real polished_w = share * real_min(own_w, mpc_full_battery_w(state, &prices));
+    const mpc_real polished_w = share * real_min(own_w, room_w);
     p_eng_w[0] = pick((on_share[0] >= stay_share) ? 1 : 0, polished_w, p_eng_w[0]);
-}
-
-mpc_real mpc_method_least_w(const mpc_state *state)
-{
-    const mpc_prices prices = mpc_polish_prices(state);
 #if MPC_STARTS
     mpc_going second[MPC_SHORT];
     for (int32_t k = 0; k < MPC_SHORT; k++) {
         second[k] = mpc_polish_going(state, &prices, k);
     }
-    const mpc_real power_w = second[0].power_w;
 #else
-    const mpc_real power_w = mpc_polish_power_w(state, &prices, 0, REAL(0.0));
+    const mpc_going second[1] = {
+        {mpc_polish_power_w(state, &prices, 0, REAL(0.0)), REAL(0.0), REAL(0.0)}};
 #endif
-    const mpc_real ramp_w = mpc_ramp_least_w(state);
-    const mpc_real fitting_w = real_min(power_w, mpc_full_battery_w(state, &prices));
-    mpc_real least_w = real_max(ramp_w, mpc_empty_battery_w(state, fitting_w, ramp_w));
-#if MPC_STARTS
-    least_w = real_max(least_w, mpc_last_run_w(state, &prices, &second[0]));
-    least_w = real_max(least_w, mpc_last_start_w(state, &prices, second));
-    least_w = real_max(least_w, mpc_short_run_w(state, &prices, second));
-    least_w = real_max(least_w, mpc_battery_run_w(state, second));
-#endif
-    return real_max(least_w, mpc_heating_run_w(state, &prices, power_w));
+    return mpc_coming_least_w(state, &prices, second, room_w);
 }
 
 void mpc_method_report(const mpc_state *state, mpc_out *out)

@@ -193,8 +193,7 @@ static void keep_plan(mpc_state *state)
         }
         state->old_arrival_s += (state->stage[k].road.duration_s > REAL(0.0)) ? 1 : 0;
     }
-    mpc_method_plan(state, state->old_on_share, state->old_p_eng_w);
-    state->old_least_w = mpc_method_least_w(state);
+    state->old_least_w = mpc_method_plan(state, state->old_on_share, state->old_p_eng_w);
     state->old_age = 0;
 }
 

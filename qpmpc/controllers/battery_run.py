@@ -10,20 +10,21 @@ The same in C: codegen/runtime/mpc_battery_run.c.
 import numpy as np
 from numpy.typing import NDArray
 
+from qpmpc.controllers.last_run import SAME_G
 from qpmpc.controllers.realise import ON_THRESHOLD
 from qpmpc.controllers.safety import SOC_MARGIN
 from qpmpc.preview.stages import Stages
-from qpmpc.qp.last_run import SAME_G
-from qpmpc.qp.polish import Polish, Prices
+from qpmpc.pwa.priced import Going
 from qpmpc.qp.rows import table_of
 from qpmpc.trip import Observation
+from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.parameters import Vehicle
 
 
 def battery_run_w(
     vehicle: Vehicle,
-    polish: Polish,
-    prices: Prices,
+    maps: BatteryMaps,
+    going: Going,
     stages: Stages,
     on_share: NDArray[np.float64],
     seen: Observation,
@@ -47,7 +48,8 @@ def battery_run_w(
     Parameters
     ----------
     vehicle : gives b, c, E_bat and SOC_min
-    polish, prices : of the plan
+    maps : of the battery
+    going : as of `last_run_w`
     stages : of the plan, from now on
     on_share : sigma of the seconds ahead by the plan, shape (N,)
     seen : the present
@@ -60,19 +62,18 @@ def battery_run_w(
     rests = int(np.argmax(runs)) if runs.any() else seconds
     to_spare = seen.soc - (battery.soc_min + SOC_MARGIN)
     spent_j = np.cumsum(h * stages.internal_off_w[:seconds])[:rests]
-    lacks_j = spent_j - polish.maps.energy_j(battery.soc_min) * to_spare
+    lacks_j = spent_j - maps.energy_j(battery.soc_min) * to_spare
     lack_j = float(lacks_j.max(initial=0.0))
     if lack_j <= 0.0:
         return 0.0
 
-    now = polish.going_in(prices, stages, 0)
+    power_w, gain_w, dearer_g_per_s = (float(each[0]) for each in going)
     if seen.engine_on:
-        pays = now.dearer_g_per_s * lack_j <= engine.start_fuel_g * now.gain_w
-        return now.power_w if pays else 0.0
+        pays = dearer_g_per_s * lack_j <= engine.start_fuel_g * gain_w
+        return power_w if pays else 0.0
     run_s, begins_by = max(engine.min_on_s, 1), int(np.argmax(lacks_j > 0.0))
     if len(stages.seconds_w(seconds)) < run_s:
         return 0.0
-    dearer_g = [polish.going_in(prices, stages, k).dearer_g_per_s for k in range(seconds)]
-    runs_g = np.convolve(dearer_g, np.ones(run_s), "valid")
+    runs_g = np.convolve(going.dearer_g_per_s, np.ones(run_s), "valid")
     later_g = runs_g[1 : begins_by + 1][h[run_s : begins_by + run_s] > 0.0]
-    return now.power_w if runs_g[0] + SAME_G <= later_g.min(initial=np.inf) else 0.0
+    return power_w if runs_g[0] + SAME_G <= later_g.min(initial=np.inf) else 0.0

@@ -9,10 +9,9 @@ The same in C: codegen/runtime/mpc_full_battery.c.
 
 import numpy as np
 
+from qpmpc.controllers.last_run import FUEL_LEAST
 from qpmpc.controllers.safety import SOC_MARGIN
 from qpmpc.preview.stages import Stages
-from qpmpc.qp.last_run import FUEL_LEAST
-from qpmpc.qp.polish import Prices
 from qpmpc.trip import Observation
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.parameters import Vehicle
@@ -22,7 +21,7 @@ from qpmpc.vehicle.section import STEP_S
 def full_battery_w(
     vehicle: Vehicle,
     maps: BatteryMaps,
-    prices: Prices,
+    fuel_g_per_g: float,
     stages: Stages,
     seconds: int,
     seen: Observation,
@@ -47,7 +46,8 @@ def full_battery_w(
     Parameters
     ----------
     vehicle, maps : limits and the battery's curves
-    prices, stages : of the plan
+    fuel_g_per_g : w_F, what a gram of fuel costs in the coming second
+    stages : of the plan, from now on
     seconds : N of the short horizon
     seen : the present
     """
@@ -55,7 +55,7 @@ def full_battery_w(
     ahead = slice(1, seconds)
     spent_j = np.cumsum((stages.duration_s * stages.internal_off_w)[ahead])
     gained_j = float((stages.rise_j[ahead] - spent_j).max(initial=0.0))
-    if gained_j <= 0.0 or prices.fuel < FUEL_LEAST:
+    if gained_j <= 0.0 or fuel_g_per_g < FUEL_LEAST:
         return np.inf
     full_soc = battery.soc_max - gained_j / maps.energy_j(battery.soc_max)
     full_soc = max(full_soc, battery.soc_min + SOC_MARGIN)

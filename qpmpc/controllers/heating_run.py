@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from qpmpc.controllers.last_run import MUST_LEAST_S
 from qpmpc.controllers.safety import T_CL_MARGIN_K, greatest_w
 from qpmpc.preview.stages import Stages
-from qpmpc.qp.last_run import MUST_LEAST_S
-from qpmpc.qp.polish import Polish, Prices
+from qpmpc.pwa.curves import Curves
 from qpmpc.qp.rows import table_of
 from qpmpc.trip import Observation
 from qpmpc.vehicle.engine import alpha_at
@@ -39,8 +39,9 @@ class _Second(NamedTuple):
 
 def heating_run_w(
     vehicle: Vehicle,
-    polish: Polish,
-    prices: Prices,
+    curves: Curves,
+    power_w: float,
+    store_g_per_j: float,
     stages: Stages,
     on_share: NDArray[np.float64],
     seen: Observation,
@@ -71,7 +72,9 @@ def heating_run_w(
     Parameters
     ----------
     vehicle : gives b, c, C, Q_out
-    polish, prices : of the plan
+    curves : f, convex, and l
+    power_w : E, least-cost power of the coming second
+    store_g_per_j : w_G, what a joule of the battery's store costs in it
     stages : of the plan, from now on
     on_share : sigma of each stage by the plan, shape (n,)
     seen : the present
@@ -88,12 +91,12 @@ def heating_run_w(
     net_w, off_w = float(stages.net_w[0]), float(stages.internal_off_w[0])
 
     def second(power_w: float) -> _Second:
-        fuel_w = hot_w * float(polish.fuel(power_w))
+        fuel_w = hot_w * float(curves.fuel_g_per_s(np.array(power_w)))
         fuel_g = fuel_w / engine.lhv_j_per_g
-        dearer_g = fuel_g - prices.internal * (off_w - polish.internal_w(net_w - power_w))
+        gain_w = off_w - float(curves.internal_w(np.array(net_w - power_w)))
+        dearer_g = fuel_g - store_g_per_j * gain_w
         return _Second(fuel_g, dearer_g, engine_w(thermal, fuel_w, power_w))
 
-    power_w = polish.power_w(prices, net_w, 0.0)
     one = second(power_w)
     left_j = lack_j + BEYOND_K * thermal.heat_capacity_j_per_k
     if seen.engine_on and table_of(engine).has_start:
@@ -110,21 +113,21 @@ def heating_run_w(
             left_j -= (run_s - 1) * STEP_S * one.heat_w
         least_w = 0.0
     if one.heat_w < left_j / STEP_S < 2.0 * one.heat_w:
-        all_w = _power_w(vehicle, polish, hot_w, left_j / STEP_S)
+        all_w = _power_w(vehicle, curves, hot_w, left_j / STEP_S)
         most_w = min(greatest_w(engine, seen, STEP_S), net_w + vehicle.battery_charge_max_w)
         if all_w <= most_w and second(all_w).dearer_g <= 2.0 * one.dearer_g:
             return all_w
     return least_w
 
 
-def _power_w(vehicle: Vehicle, polish: Polish, hot_w: float, heat_w: float) -> float:
+def _power_w(vehicle: Vehicle, curves: Curves, hot_w: float, heat_w: float) -> float:
     """Return the power that gives this heat: the least over the pieces, as fuel is the greatest.
 
     A piece on which heat does not grow with power bounds nothing; infinite where none does.
     """
-    fuel, kept = polish.fuel, engine_w(vehicle.thermal, 1.0, 0.0)
-    grows = hot_w * fuel.slope - 1.0
-    above_w = heat_w / kept - hot_w * fuel.intercept
+    kept = engine_w(vehicle.thermal, 1.0, 0.0)
+    grows = hot_w * curves.slope - 1.0
+    above_w = heat_w / kept - hot_w * curves.intercept
     of_pieces = np.where(grows > LEAST_GROWTH, above_w / np.maximum(grows, LEAST_GROWTH), np.inf)
     return float(of_pieces.min())
 

@@ -7,28 +7,32 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from qpmpc.controllers.coming_second import Coming, least_w, most_w
 from qpmpc.controllers.ramp import RampFloor
 from qpmpc.controllers.receding_horizon import Plan, Planner
 from qpmpc.controllers.settings import SettingsLike
 from qpmpc.costate.certificate import Followed, Layout, choose, follow, violation_price_g
-from qpmpc.costate.dual import Multipliers, StageCosts
+from qpmpc.costate.dual import Multipliers, StageCosts, stage_prices
 from qpmpc.costate.path import Shortest
-from qpmpc.costate.program import Program, ProgramBuilder
+from qpmpc.costate.program import USUAL_CHARGE, Program, ProgramBuilder, unit_g
 from qpmpc.costate.solve import newton
 from qpmpc.preview.horizon import HorizonSettings
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.model import PwaModel
+from qpmpc.pwa.priced import Least, StagePrices, going
 from qpmpc.qp.expectation import expectation
 from qpmpc.qp.linearisation import Linearisation
-from qpmpc.qp.rows import Var
+from qpmpc.qp.rows import Var, table_of
 from qpmpc.qp.settings import LimitSettings
 from qpmpc.trip import Observation, Trip
+from qpmpc.vehicle.battery import BatteryMaps
+from qpmpc.vehicle.engine_parameters import Engine
 
 Floats = NDArray[np.float64]
 
 DEPARTURE_LINEARISATIONS, DEPARTURE_ROUNDS = 5, 30
-COLD_CHARGE = 1.3  # lambda where there is no plan yet, in fuel of the engine at its best
-MOST_CHARGE = 10.0  # the largest allowed, likewise
+ROUNDS, START_ROUNDS = 5, 4
+MOST_CHARGE = 10.0  # the largest lambda allowed, in fuel of the engine at its best
 
 
 class MhCostateSettings(BaseModel):
@@ -39,7 +43,8 @@ class MhCostateSettings(BaseModel):
     horizon : layout of the stages, as of `mh_qp`, but `entry_share` is 0: blocks are apart
     limits : terminal band and margins, as of `mh_qp.qp`; it comes nearer to a limit than an
         iteration that is stopped, and needs less of a margin to it
-    rounds : Newton rounds of a second
+    rounds : Newton rounds of a second; if not given `ROUNDS`, or `START_ROUNDS` where a start costs
+        something: there a round is more work, and a plan gains less by one more
     implementation : as of `mh_qp`
     """
 
@@ -47,7 +52,7 @@ class MhCostateSettings(BaseModel):
 
     horizon: HorizonSettings = HorizonSettings(blocks=20, entry_share=0.0)
     limits: LimitSettings = LimitSettings(t_cl_margin_k=0.1)
-    rounds: Annotated[int, Field(ge=1, le=1000)] = 5
+    rounds: Annotated[int, Field(ge=1, le=1000)] | None = None
     implementation: Literal["auto", "c", "python"] = "auto"
 
     @field_validator("horizon")
@@ -59,12 +64,11 @@ class MhCostateSettings(BaseModel):
             )
         return horizon
 
-
-def unit_g(model: PwaModel) -> float:
-    """Return the fuel that charges the whole battery, with the engine at its best, g."""
-    line = model.line
-    best_g_per_j = float((line.fuel_g_per_s[1:] / line.power_w[1:]).min())
-    return best_g_per_j * model.battery_energy_j
+    def rounds_of(self, engine: Engine) -> int:
+        """Return the rounds of a second with this engine."""
+        if self.rounds is not None:
+            return self.rounds
+        return START_ROUNDS if table_of(engine).has_start else ROUNDS
 
 
 def most_charge_g(model: PwaModel) -> float:
@@ -85,6 +89,7 @@ class CostatePlan:
     followed : the plan, with on or off in the seconds ahead
     bound_g : no plan of this program costs less
     x : of the plan, columns as in `Var`, shape (n, len(Var))
+    coming : what the rules of the coming second know of it
     """
 
     stages: Stages
@@ -95,6 +100,7 @@ class CostatePlan:
     followed: Followed
     bound_g: float
     x: Floats
+    coming: Coming
 
     @property
     def certificate_g(self) -> float:
@@ -118,15 +124,15 @@ class MhCostate(Planner):
         super().__init__(trip, settings)
         own = self.own_settings()
         assert isinstance(own, MhCostateSettings)
-        self._horizon, self._rounds = own.horizon, own.rounds
         vehicle = trip.vehicle
+        self._horizon, self._rounds = own.horizon, own.rounds_of(vehicle.engine)
         self.preview = trip.preview(own.horizon)
         self.model = PwaModel.of(vehicle)
         self._most_charge_g = most_charge_g(self.model)
         self.programs = ProgramBuilder(
             vehicle, self.model, self.preview.count, own.limits, own.horizon
         )
-        self._ramp = RampFloor(vehicle)
+        self._ramp, self._maps = RampFloor(vehicle), BatteryMaps(vehicle.battery)
         self._shift = self.preview.shift()
         self._shortest = Shortest.of(vehicle.engine)
         self.last: CostatePlan | None = None
@@ -149,15 +155,20 @@ class MhCostate(Planner):
         solved = self.solve(seen)
         if self.solver_fails:
             return Plan.none(iterations=self._rounds)
-        short = self._horizon.short_stages
+        short, vehicle, coming = self._horizon.short_stages, self.trip.vehicle, solved.coming
+        ramp_w = self._ramp.least_w(solved.stages.seconds_w(short), seen.soc)
+        room_w = most_w(vehicle, self._maps, coming, seen)
+        power_w = solved.power_w[:short].copy()
+        power_w[0] = min(power_w[0], room_w)
+        of_plan = (self._maps, solved.program.shared, coming)
         return Plan(
             solved.share[:short],
-            solved.power_w[:short],
+            power_w,
             iterations=self._rounds,
             arrival_s=solved.stages.arrival_s(short),
-            least_w=self._ramp.least_w(solved.stages.seconds_w(short), seen.soc),
+            least_w=least_w(vehicle, *of_plan, seen, ramp_w, room_w),
             certificate_g=solved.certificate_g,
-            fast_s=solved.stages.fast_s(short, self.trip.vehicle),
+            fast_s=solved.stages.fast_s(short, vehicle),
         )
 
     def solve(self, seen: Observation) -> CostatePlan:
@@ -188,7 +199,7 @@ class MhCostate(Planner):
 
     def _cold(self, t_cl_degc: float) -> tuple[Linearisation, Multipliers]:
         n = self.preview.count
-        charge = np.full(n, COLD_CHARGE * unit_g(self.model))
+        charge = np.full(n, USUAL_CHARGE * unit_g(self.model))
         return Linearisation.constant(n, t_cl_degc), Multipliers(charge, np.zeros(n))
 
     def _solve(
@@ -199,7 +210,8 @@ class MhCostate(Planner):
         start: Multipliers,
         rounds: int,
     ) -> CostatePlan:
-        program = self.programs.at(stages, seen.soc, seen.t_cl_degc, about, seen.engine_on)
+        state = (seen.soc, seen.t_cl_degc, about, seen.engine_on)
+        program = self.programs.at(stages, *state, start.charge)
         start = start.near(program, about.t_cl_end_degc)
         found = newton(program, start, rounds, self._most_charge_g)
         layout = Layout.of(stages, self._horizon, self._shortest, seen.engine_for_s)
@@ -216,5 +228,19 @@ class MhCostate(Planner):
         x[:, Var.ON], x[:, Var.START] = followed.on_share, followed.starts
         x[:, Var.P_ENG], x[:, Var.FUEL] = followed.power_w, followed.fuel_g_per_s
         x[:, Var.INTERNAL] = followed.internal_w
-        at, shares = found.at, found.share
-        return CostatePlan(stages, program, at, shares, power_w, followed, choice.bound_g, x)
+        coming = _coming(stages, program, found.at, costs, x)
+        of_dual = (found.at, found.share, power_w)
+        return CostatePlan(stages, program, *of_dual, followed, choice.bound_g, x, coming)
+
+
+def _coming(
+    stages: Stages, program: Program, at: Multipliers, costs: StageCosts, x: Floats
+) -> Coming:
+    """Return what the rules of the coming second know of a plan: each second at its own prices."""
+    p, short = program, program.short
+    prices = stage_prices(p, at, costs.nu)
+    seconds = StagePrices(*(each[:short] for each in prices))
+    on = Least(*(each[:short] for each in costs.on))
+    ahead = going(on, stages.internal_off_w[:short], seconds)
+    fuel, store = float(prices.fuel[0]), float(prices.internal[0])
+    return Coming(stages, x[:, Var.ON], x[:, Var.INTERNAL], ahead, fuel, store)

@@ -6,23 +6,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from qpmpc.controllers.battery_run import battery_run_w
-from qpmpc.controllers.empty_battery import empty_battery_w
-from qpmpc.controllers.full_battery import full_battery_w
-from qpmpc.controllers.heating_run import heating_run_w
+from qpmpc.controllers.coming_second import Coming, least_w, most_w
 from qpmpc.controllers.monitor import Flag
 from qpmpc.controllers.qp_certificate import certificate_of
 from qpmpc.controllers.ramp import RampFloor
 from qpmpc.controllers.realise import STAY_SHARE, power_while_on_w
 from qpmpc.controllers.receding_horizon import Plan, Planner
 from qpmpc.controllers.settings import ControllerSettings, MhQpSettings, SettingsLike
-from qpmpc.controllers.short_run import short_run_w
 from qpmpc.errors import InputError
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.learned_fuel import LearnedFuel
 from qpmpc.pwa.model import PwaModel, learned_fuel
 from qpmpc.qp.expectation import expectation
-from qpmpc.qp.last_run import last_run_w, last_start_w
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.polish import Polish
 from qpmpc.qp.relaxation import relaxation_gap
@@ -182,29 +177,16 @@ class QpPlanner(Planner):
         short = slice(self.of_qp.horizon.short_stages)
         on_share = solved.x[short, Var.ON]
         power_w = power_while_on_w(on_share, solved.x[short, Var.P_ENG])
-        least_w = self._ramp.least_w(solved.stages.seconds_w(short.stop), seen.soc)
+        ramp_w = asked_w = self._ramp.least_w(solved.stages.seconds_w(short.stop), seen.soc)
         if self.of_qp.polish:
-            prices, stages = self.qp.prices(solved.duals), solved.stages
-            vehicle, polish, x = self.trip.vehicle, self._polish, solved.x
-            net_w = float(stages.net_w[0])
-            battery, maps = vehicle.battery, polish.maps
-            most_w = full_battery_w(vehicle, maps, prices, stages, short.stop, seen)
+            vehicle, polish = self.trip.vehicle, self._polish
+            prices, coming = self.qp.prices(solved.duals), self._coming(solved)
+            room_w = most_w(vehicle, polish.maps, coming, seen)
             if on_share[0] >= STAY_SHARE:
-                power_w[0] = min(polish.power_w(prices, net_w, float(power_w[0])), most_w)
-            cheapest_w = min(polish.power_w(prices, net_w, 0.0), most_w)
-            empty_w = empty_battery_w(battery, maps, net_w, seen.soc, cheapest_w, least_w)
-            least_w = max(least_w, empty_w)
-            internal_w, engine = x[:, Var.INTERNAL], vehicle.engine
-            if seen.engine_on:
-                going_w = last_run_w(engine, polish, prices, stages, internal_w)
-                least_w = max(least_w, going_w)
-            else:
-                starts_w = last_start_w(engine, polish, prices, stages, internal_w, short.stop)
-                early_w = short_run_w(engine, polish, prices, stages, on_share)
-                least_w = max(least_w, starts_w, early_w)
-            battery_w = battery_run_w(vehicle, polish, prices, stages, on_share, seen)
-            heating_w = heating_run_w(vehicle, polish, prices, stages, x[:, Var.ON], seen)
-            least_w = max(least_w, battery_w, heating_w)
+                net_w = float(solved.stages.net_w[0])
+                power_w[0] = min(polish.power_w(prices, net_w, float(power_w[0])), room_w)
+            plan = (polish.maps, polish.pieces, coming)
+            asked_w = least_w(vehicle, *plan, seen, ramp_w, room_w)
         return Plan(
             on_share,
             power_w,
@@ -212,13 +194,21 @@ class QpPlanner(Planner):
             iterations,
             relaxation_gap(self.trip.vehicle, self.model, solved.stages, solved.x),
             arrival_s=solved.stages.arrival_s(self.of_qp.horizon.short_stages),
-            least_w=least_w,
+            least_w=asked_w,
             certificate_g=self._certificate(
                 solved.stages, seen, solved.about, solved.x, solved.duals
             ),
             fast_s=solved.stages.fast_s(short.stop, self.trip.vehicle),
             stay_share=STAY_SHARE,
         )
+
+    def _coming(self, solved: QpPlan) -> Coming:
+        """Return what the rules of the coming second know of a solution."""
+        prices, stages, x = self.qp.prices(solved.duals), solved.stages, solved.x
+        short = slice(self.of_qp.horizon.short_stages)
+        going = self._polish.going(prices, stages.net_w[short], stages.internal_off_w[short])
+        on_share, internal_w = x[:, Var.ON], x[:, Var.INTERNAL]
+        return Coming(stages, on_share, internal_w, going, prices.fuel, prices.internal)
 
     def solve(self, seen: Observation) -> QpPlan:
         """Solve the QP of this second, from the last usable solution, shifted along.

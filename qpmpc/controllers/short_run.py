@@ -10,18 +10,18 @@ The same in C: codegen/runtime/mpc_short_run.c.
 import numpy as np
 from numpy.typing import NDArray
 
+from qpmpc.controllers.last_run import FUEL_LEAST, SAME_G
 from qpmpc.controllers.realise import ON_THRESHOLD
 from qpmpc.preview.stages import Stages
-from qpmpc.qp.last_run import FUEL_LEAST, SAME_G
-from qpmpc.qp.polish import Polish, Prices
+from qpmpc.pwa.priced import Going
 from qpmpc.qp.rows import table_of
 from qpmpc.vehicle.engine_parameters import Engine
 
 
 def short_run_w(
     engine: Engine,
-    polish: Polish,
-    prices: Prices,
+    going: Going,
+    fuel_g_per_g: float,
     stages: Stages,
     on_share: NDArray[np.float64],
 ) -> float:
@@ -43,7 +43,7 @@ def short_run_w(
     Parameters
     ----------
     engine : gives b
-    polish, prices : of the plan
+    going, fuel_g_per_g : as of `last_run_w`
     stages : of the plan, from now on
     on_share : sigma of the seconds ahead by the plan, shape (N,)
     """
@@ -52,15 +52,14 @@ def short_run_w(
     first = int(np.argmax(runs))
     end = first + run_s
     lasts = 0 < first < run_s and end <= len(stages.seconds_w(len(on_share)))
-    if not table_of(engine).has_start or not lasts or prices.fuel < FUEL_LEAST:
+    if not table_of(engine).has_start or not lasts or fuel_g_per_g < FUEL_LEAST:
         return 0.0
     is_started = np.clip(on_share[first:end], 0.0, 1.0).mean() >= ON_THRESHOLD
     if not is_started and stages.must_share[first] < ON_THRESHOLD:
         return 0.0
-    seconds = [polish.going_in(prices, stages, k) for k in range(end)]
-    costs_g = np.maximum([second.dearer_g_per_s for second in seconds], 0.0)
+    costs_g = np.maximum(going.dearer_g_per_s[:end], 0.0)
     spared_g = np.where(runs[:end], 0.0, costs_g)
     # G_s - G_s+1, from s = f - 1 down to now; G_f = 0
     gains_g = np.cumsum((spared_g[run_s:] - costs_g[:first])[::-1])
     later_g = gains_g[:-1].max(initial=0.0)
-    return seconds[0].power_w if gains_g[-1] > later_g + SAME_G else 0.0
+    return float(going.power_w[0]) if gains_g[-1] > later_g + SAME_G else 0.0

@@ -12,14 +12,9 @@ from qpmpc.pwa.priced import Least, StagePrices, least, least_convex
 
 Floats = NDArray[np.float64]
 
-# Cost of off less that of on over which the on-share goes from 0 to 1, of a second and of a longer
-# stage. Where starts are free the engine runs in the seconds of a class that ask for most; where
-# they cost, through it.
-SWITCH_G_PER_S, LONG_SWITCH_G_PER_S = 0.03, 0.05
-START_SWITCH_G_PER_S, START_LONG_SWITCH_G_PER_S = 0.01, 0.015
-LEAST_SWITCH_G = 1e-4  # of a masked stage
 START_QUARTER_STEPS = 12  # of the funnel, a quarter of those a stage has
 
+EDGE = 1e-6  # of sigma (1 - sigma): as near to 0 or 1 a share may be there, but for rounding
 NEAR_K = 1.0  # of a coolant limit: a plan that is further from it has left it
 
 
@@ -54,6 +49,8 @@ class Multipliers:
 
         A limit that has a multiplier is aimed at from either side (`solve`). Of one that the road
         has left meanwhile that aim is wrong, and all others with it: no round may rise any more.
+        That of the last stage stays. It is the price of heat for the whole trip, and a plan rounded
+        to whole seconds may well end a kelvin off.
 
         Parameters
         ----------
@@ -63,6 +60,7 @@ class Multipliers:
         above = t_cl_degc > program.t_low + NEAR_K
         below = t_cl_degc < program.t_high - NEAR_K
         has_left = np.where(self.heat > 0.0, above, below)
+        has_left[-1] = False
         return Multipliers(self.charge, np.where(has_left, 0.0, self.heat))
 
 
@@ -86,6 +84,13 @@ def coolant_costate(program: Program, heat: Floats) -> Floats:
         after = (drive[k] - before[k] * after) / t_end[k]
         price.append(after)
     return np.array(price[::-1])
+
+
+def stage_prices(program: Program, at: Multipliers, nu: Floats) -> StagePrices:
+    """Return what the rates of each stage cost: w_F, w_E and w_G."""
+    p = program
+    charge = at.charge * p.charge_per_w
+    return StagePrices(p.fuel_cost - nu * p.per_fuel, nu * p.per_power, charge)
 
 
 @dataclass(frozen=True)
@@ -131,13 +136,12 @@ class StageCosts:
         """Evaluate all stages on these curves."""
         p = program
         nu = coolant_costate(p, at.heat)
-        price_internal = at.charge * p.charge_per_w
         minimised = least_convex if curves is p.shared else least
-        prices = StagePrices(p.fuel_cost - nu * p.per_fuel, nu * p.per_power, price_internal)
+        prices = stage_prices(p, at, nu)
         on = minimised(curves, p.net_w, p.low_w, p.high_w, prices)
         forced = minimised(curves, p.forced_net_w, p.forced_low_w, p.forced_high_w, prices)
         start = p.start_fuel_g + at.charge * p.cranking_soc - nu * p.start_k
-        off = p.free * price_internal * p.off_w
+        off = p.free * prices.internal * p.off_w
         return cls(
             nu,
             on,
@@ -165,7 +169,6 @@ class Dual:
     change, heat : of SOC and of the coolant row by each stage, starts included
     charge_curvature, cross_curvature, heat_curvature : derivatives of `change` with respect to
         lambda, of `change` to nu, of `heat` to nu
-    width : W
     """
 
     at: Multipliers
@@ -178,7 +181,6 @@ class Dual:
     charge_curvature: Floats
     cross_curvature: Floats
     heat_curvature: Floats
-    width: Floats
 
 
 def constant_part(program: Program, at: Multipliers, nu: Floats) -> float:
@@ -200,12 +202,7 @@ def dual(program: Program, at: Multipliers) -> Dual:
     couple the stages of a chain by prices e_k of sigma_k - sigma_k-1 between 0 and rises_k times
     the cost of a start; that is a funnel too.
     """
-    p, costs = program, StageCosts.of(program, at, program.shared)
-    second, longer = SWITCH_G_PER_S, LONG_SWITCH_G_PER_S
-    if p.has_start:
-        second, longer = START_SWITCH_G_PER_S, START_LONG_SWITCH_G_PER_S
-    width = np.where(p.duration_s > 1.0, longer, second) * p.duration_s
-    width = np.maximum(width * p.free, LEAST_SWITCH_G)
+    p, costs, width = program, StageCosts.of(program, at, program.shared), program.width
     free = p.can & ~p.must
     difference = np.where(free, costs.on_cost, 0.0) - np.where(free, costs.off_cost, 0.0)
     starts_g, starts = np.zeros_like(width), np.zeros_like(width)
@@ -238,7 +235,7 @@ def dual(program: Program, at: Multipliers) -> Dual:
         of_heat += gives * v_heat**2
     switch_charge = p.free * p.charge_per_w * (p.off_w - on.internal_w)
     switch_heat = p.free * (p.per_fuel * on.fuel_g_per_s - p.per_power * on.power_w)
-    turns = np.where(free & (share > 0.0) & (share < 1.0), 1.0 / width, 0.0)
+    turns = np.where(free & (share * (1.0 - share) > EDGE), 1.0 / width, 0.0)
     spent_w = p.free * p.off_w + p.forced * forced.internal_w
     change = share * switch_charge - p.charge_per_w * spent_w - p.cranking_soc * starts
     of_forced = p.per_fuel * forced.fuel_g_per_s - p.per_power * forced.power_w
@@ -254,7 +251,6 @@ def dual(program: Program, at: Multipliers) -> Dual:
         of_charge + turns * switch_charge**2,
         cross + turns * switch_charge * switch_heat,
         of_heat + turns * switch_heat**2,
-        width,
     )
 
 

@@ -42,6 +42,30 @@ MADE = [target for line in parsed(PROGRAM) for target in targets_of(line)]
 _PROGRAM_CODE = code_of(parsed(PROGRAM))
 
 
+# s, cost of off less that of on over which the on-share goes from 0 to 1, of a second and of a
+# longer stage. Where starts are free the engine runs in the seconds of a class that ask for most;
+# where they cost, through it.
+SWITCH_G_PER_S, LONG_SWITCH_G_PER_S = 0.03, 0.05
+START_SWITCH_G_PER_S, START_LONG_SWITCH_G_PER_S = 0.01, 0.015
+LEAST_SWITCH_G = 1e-4  # of a masked stage
+LEAST_WORTH = 0.1  # of these costs, where a charge is worth nearly nothing
+USUAL_CHARGE = 1.3  # lambda of a usual trip, in fuel of the engine at its best
+
+
+def switches_g_per_s(has_start: bool) -> tuple[float, float]:
+    """Return s of a second and of a longer stage."""
+    if has_start:
+        return START_SWITCH_G_PER_S, START_LONG_SWITCH_G_PER_S
+    return SWITCH_G_PER_S, LONG_SWITCH_G_PER_S
+
+
+def unit_g(model: PwaModel) -> float:
+    """Return the fuel that charges the whole battery, with the engine at its best, g."""
+    line = model.line
+    best_g_per_j = float((line.fuel_g_per_s[1:] / line.power_w[1:]).min())
+    return best_g_per_j * model.battery_energy_j
+
+
 @dataclass(frozen=True)
 class Program:
     """Numbers of one second's program; shape (n,) unless said.
@@ -75,6 +99,7 @@ class Program:
     start_k : heat of a start, K
     starts_on : engine state now
     rises : see `Stages`; of sigma, and so fewer by the share without a choice
+    width : W, cost of on against off over which the search smoothes the switch, g
     soc, t_cl_degc : state now, scalars
     """
 
@@ -112,6 +137,7 @@ class Program:
     start_k: Floats
     starts_on: bool
     rises: Floats
+    width: Floats
     soc: float
     t_cl_degc: float
 
@@ -146,6 +172,7 @@ class ProgramBuilder:
         self._quantities = Quantities(self._parameters, vehicle, model, stages)
         self._curves = Curves.of(vehicle, model.line)
         self._shared = self._curves.envelope()
+        self._usual_g = USUAL_CHARGE * unit_g(model)
 
     def at(
         self,
@@ -154,8 +181,22 @@ class ProgramBuilder:
         t_cl_degc: float,
         about: Linearisation,
         engine_on: bool,
+        charge_g: Floats | None = None,
     ) -> Program:
-        """Return the program of a horizon and a state, expanded about a plan."""
+        """Return the program of a horizon and a state, expanded about a plan.
+
+        The seconds of a stage differ by what they ask of the battery, and that is worth lambda:
+        where heat makes a charge cheap, their costs of on against off differ less too,
+
+            W = h s min(max(lambda / lambda_usual, `LEAST_WORTH`), 1)
+
+        with s of a second or of a longer stage, where starts cost something or nothing.
+
+        Parameters
+        ----------
+        stages, soc, t_cl_degc, about, engine_on : of the second
+        charge_g : lambda of each stage by the last plan, shape (n,); as usual if None
+        """
         names = self._quantities.update(stages, soc, about, engine_on)
         exec(_PROGRAM_CODE, names)
         number = self._parameters
@@ -171,6 +212,11 @@ class ProgramBuilder:
         forced = np.where(must, 0.0, stages.must_share)
         rises = stages.rises * (1.0 - forced)
         rises[1:] *= 1.0 - forced[:-1]
+        has_start = number["start_fuel_g"] > 0.0 or number["cranking_j"] > 0.0
+        usual_g = np.full(count, self._usual_g) if charge_g is None else charge_g
+        worth = np.clip(usual_g / self._usual_g, LEAST_WORTH, 1.0)
+        second, longer = switches_g_per_s(has_start)
+        width = np.where(stages.duration_s > 1.0, longer, second) * stages.duration_s
         price_t = growing.copy()
         price_t[:-1] += growing[1:]
         return Program(
@@ -191,6 +237,7 @@ class ProgramBuilder:
             cranking_soc=number["cranking_j"] / number["battery_energy_j"],
             starts_on=engine_on,
             rises=rises,
+            width=np.maximum(width * (1.0 - forced) * worth, LEAST_SWITCH_G),
             soc=soc,
             t_cl_degc=t_cl_degc,
             **of,

@@ -83,7 +83,7 @@ def aim(program: Program, here: Dual, most_charge: float, moved: int = BOTH) -> 
     p, at = program, here.at
     # of a stage that does not respond now: of switching an engine at a moderate power
     moderate_w, fuel = moderate(p.curves)
-    background = BACKGROUND / here.width
+    background = BACKGROUND / p.width
     of_charge = here.charge_curvature + background * (p.free * p.charge_per_w * moderate_w) ** 2
     warms = p.free * (p.per_fuel * fuel - p.per_power * moderate_w)
     of_heat = here.heat_curvature + background * warms**2

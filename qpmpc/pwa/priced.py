@@ -46,6 +46,30 @@ class StagePrices(NamedTuple):
     internal: Floats
 
 
+class Going(NamedTuple):
+    """Seconds with the engine on, at their least-cost power, against the same with it off.
+
+    Shape (N,) each.
+
+    Attributes
+    ----------
+    power_w : E
+    gain_w : g = l(P0) - l(P0 - E), what the battery's store gains by it
+    dearer_g_per_s : d = w_F f(E) + w_E E - w_G g, what it costs more at the plan's prices
+    """
+
+    power_w: Floats
+    gain_w: Floats
+    dearer_g_per_s: Floats
+
+
+def going(on: Least, off_w: Floats, at: StagePrices) -> Going:
+    """Return seconds with the engine on against l(P0), the internal power with it off."""
+    gain_w = off_w - on.internal_w
+    spent = at.fuel * on.fuel_g_per_s + at.power * on.power_w
+    return Going(on.power_w, gain_w, spent - at.internal * gain_w)
+
+
 class _Pieces(NamedTuple):
     """Each piece of f as if it went on for ever, shape (n, pieces) each: E_i, r_i, dE_i."""
 

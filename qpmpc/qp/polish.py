@@ -11,14 +11,16 @@ The same in C: codegen/runtime/mpc_polish.c.
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from qpmpc.preview.stages import Stages
 from qpmpc.pwa.curves import Curves
 from qpmpc.pwa.fit import PwaFit
 from qpmpc.pwa.model import PwaModel
-from qpmpc.pwa.priced import Least, StagePrices, least
+from qpmpc.pwa.priced import Going, Least, StagePrices, going, least
 from qpmpc.vehicle.battery import BatteryMaps
 from qpmpc.vehicle.parameters import Vehicle
+
+Floats = NDArray[np.float64]
 
 # Of the chords of the engine's line, and the power beyond which it seldom runs, see `Curves.of`.
 LINE_TOLERANCE_G_PER_S, LINE_KNEE_W = 2e-4, 20e3
@@ -37,21 +39,6 @@ class Prices(NamedTuple):
     fuel: float
     p_eng: float
     internal: float
-
-
-class Going(NamedTuple):
-    """A second with the engine on, at its least-cost power, against the same with it off.
-
-    Attributes
-    ----------
-    power_w : E
-    gain_w : g = l(P0) - l(P0 - E), what the battery's store gains by it
-    dearer_g_per_s : d = w_F f(E) + w_E E - w_G g, what it costs more at the plan's prices
-    """
-
-    power_w: float
-    gain_w: float
-    dearer_g_per_s: float
 
 
 class Polish:
@@ -75,24 +62,26 @@ class Polish:
 
     Attributes
     ----------
-    fuel : the plan's fuel curve, as it is known now
     curves : f and l
+    pieces : the same with the plan's own fuel curve, convex, as it is known now
     maps : of the battery
     """
 
     def __init__(self, vehicle: Vehicle, model: PwaModel, learning: bool = False) -> None:
         self._vehicle, self.maps = vehicle, BatteryMaps(vehicle.battery)
-        self.fuel = model.fuel
         self.curves = Curves.of(vehicle, model.line, LINE_TOLERANCE_G_PER_S, LINE_KNEE_W)
+        self.pieces = self._with(model.fuel)
         if learning:
-            self.learn(model.fuel)
+            self.curves = self.pieces
 
     def learn(self, fuel: PwaFit) -> None:
         """Use another fuel curve from now on."""
-        self.fuel = fuel
+        self.curves = self.pieces = self._with(fuel)
+
+    def _with(self, fuel: PwaFit) -> Curves:
         curves, power_w = self.curves, fuel.breakpoints
         ohms = curves.discharge_ohm, curves.charge_ohm
-        self.curves = Curves.through(power_w, fuel(power_w), curves.square_v2, *ohms)
+        return Curves.through(power_w, fuel(power_w), curves.square_v2, *ohms)
 
     def internal_w(self, power_w: float) -> float:
         """Return the battery's internal power l(P)."""
@@ -100,26 +89,20 @@ class Polish:
 
     def power_w(self, prices: Prices, net_w: float, planned_w: float) -> float:
         """Return that power, or `planned_w` where a charge in the battery has no price."""
-        return float(self._least(prices, net_w, planned_w).power_w[0])
+        return float(self._least(prices, np.array([net_w]), planned_w).power_w[0])
 
-    def going(self, prices: Prices, net_w: float, off_w: float) -> Going:
-        """Return the second of net power P0 and internal power with the engine off l(P0)."""
-        on = self._least(prices, net_w, 0.0)
-        power_w, gain_w = float(on.power_w[0]), off_w - float(on.internal_w[0])
-        spent = prices.fuel * float(on.fuel_g_per_s[0]) + prices.p_eng * power_w
-        return Going(power_w, gain_w, spent - prices.internal * gain_w)
+    def going(self, prices: Prices, net_w: Floats, off_w: Floats) -> Going:
+        """Return seconds of net power P0 and internal power with the engine off l(P0)."""
+        at = StagePrices(*(np.full(len(net_w), each) for each in prices))
+        return going(self._least(prices, net_w, 0.0), off_w, at)
 
-    def _least(self, prices: Prices, net_w: float, planned_w: float) -> Least:
+    def _least(self, prices: Prices, net_w: Floats, planned_w: float) -> Least:
         vehicle, engine = self._vehicle, self._vehicle.engine
-        low_w = max(engine.power_min_w, net_w - vehicle.battery_discharge_max_w)
-        high_w = max(min(engine.power_max_w, net_w + vehicle.battery_charge_max_w), low_w)
+        low_w = np.maximum(engine.power_min_w, net_w - vehicle.battery_discharge_max_w)
+        high_w = np.minimum(engine.power_max_w, net_w + vehicle.battery_charge_max_w)
+        high_w = np.maximum(high_w, low_w)
         if not prices.internal > 0.0:
-            low_w = high_w = planned_w
+            low_w = high_w = np.full(len(net_w), planned_w)
             prices = prices._replace(internal=1.0)
-        net, low, high = (np.array([each]) for each in (net_w, low_w, high_w))
-        at = StagePrices(*(np.array([each]) for each in prices))
-        return least(self.curves, net, low, high, at)
-
-    def going_in(self, prices: Prices, stages: Stages, k: int) -> Going:
-        """Return the k-th of the coming seconds."""
-        return self.going(prices, float(stages.net_w[k]), float(stages.internal_off_w[k]))
+        at = StagePrices(*(np.full(len(net_w), each) for each in prices))
+        return least(self.curves, net_w, low_w, high_w, at)

@@ -20,9 +20,9 @@ PLANT, LIMIT = Plant(CAR), CAR.battery.soc_min
 POLISH = Polish(CAR, PwaModel.of(CAR))
 PRICES = Prices(fuel=1.0, p_eng=0.0, internal=9e-5)  # g/g, g/J: see test_last_run.py
 LOW = {
-    "thermal.t_amb_degc": -3.495173,
-    "trip.soc_init": 0.420633,
-    "trip.t_cl_init_degc": 53.602287,
+    "thermal.t_amb_degc": -2.486434,
+    "trip.soc_init": 0.419465,
+    "trip.t_cl_init_degc": 81.602422,
 }
 POOR_W = 4e3  # half the power of least consumption and less: a third more fuel per kWh
 
@@ -45,20 +45,21 @@ def test_it_empties_where_the_plant_ends_below_the_limit(above: float, demand_w:
 
 
 def drive(made_in: str) -> Trajectory:
-    return drive_in(made_in, "random-7408-160s", "paper-liion", LOW)
+    return drive_in(made_in, "random-9055-165s", "paper-liion", LOW)
 
 
 def test_no_second_at_the_limit_is_driven_at_a_poor_power(monkeypatch) -> None:
-    """Two seconds of less than 4 kW before; now at the power of least consumption."""
+    """Five seconds of less than 4 kW before; now at the power of least consumption."""
     now = drive("python")
-    monkeypatch.setattr("qpmpc.controllers.qp_planner.empty_battery_w", lambda *_: 0.0)
+    monkeypatch.setattr("qpmpc.controllers.coming_second.empty_battery_w", lambda *_: 0.0)
     before = drive("python")
     poor = [int((run.engine_on & (run.p_eng_w < POOR_W)).sum()) for run in (now, before)]
-    assert poor[0] == 0 < poor[1]
+    assert poor[0] == 0
+    assert poor[1] == 5
     assert now.soc.min() >= LIMIT
     soc_g = 162.0  # of a unit of SOC with this battery: see test_last_run.py
     fuel_g = [run.fuel_g.sum() - soc_g * (run.soc[-1] - run.soc[0]) for run in (now, before)]
-    assert fuel_g[1] > 1.005 * fuel_g[0]
+    assert fuel_g[1] > 1.03 * fuel_g[0]
 
 
 def test_a_plan_at_the_lower_limit_starts_no_engine_for_a_few_watts(monkeypatch) -> None:
@@ -74,7 +75,7 @@ def test_a_plan_at_the_lower_limit_starts_no_engine_for_a_few_watts(monkeypatch)
 
     assert least_of_runs_w() > POOR_W
     # a run in good time for what the battery lacks would hide it: test_battery_run.py
-    monkeypatch.setattr("qpmpc.controllers.qp_planner.battery_run_w", lambda *_: 0.0)
+    monkeypatch.setattr("qpmpc.controllers.coming_second.battery_run_w", lambda *_: 0.0)
     assert least_of_runs_w() > POOR_W
     monkeypatch.setattr("qpmpc.qp.rows.SOC_KEPT", 0.0)
     assert least_of_runs_w() < 200.0

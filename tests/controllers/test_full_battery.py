@@ -8,18 +8,17 @@ from short_trip import assert_same_commands, drive_in
 
 from qpmpc.codegen.c_compiler import compiler
 from qpmpc.controllers.full_battery import full_battery_w
+from qpmpc.controllers.last_run import FUEL_LEAST
 from qpmpc.controllers.safety import SOC_MARGIN
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa import PwaModel
-from qpmpc.qp.last_run import FUEL_LEAST
-from qpmpc.qp.polish import Polish, Prices
+from qpmpc.qp.polish import Polish
 from qpmpc.trajectory import Trajectory
 from qpmpc.trip import Observation
 from qpmpc.vehicle import Command, Plant, PlantState, load_vehicle
 
 CAR = load_vehicle("paper-liion")
 POLISH, PLANT = Polish(CAR, PwaModel.of(CAR)), Plant(CAR)
-PRICES = Prices(fuel=1.0, p_eng=0.0, internal=6e-5)
 FULL = CAR.battery.soc_max
 ENERGY_J = POLISH.maps.energy_j(FULL)
 SECONDS, SPEED_MPS = 20, 10.0
@@ -37,8 +36,7 @@ def most_w(net_w, soc: float, fuel: float = 1.0, beyond_j: float = 0.0) -> float
         zero + 1.0, np.array(net_w), zero + SPEED_MPS, off_w, zero, zero, off_w, zero, zero, rise_j
     )
     seen = Observation(9, soc, 60.0, True, net_w[0] - AUX_W, SPEED_MPS, 9, 10e3)
-    prices = PRICES._replace(fuel=fuel)
-    return full_battery_w(CAR, POLISH.maps, prices, trip, SECONDS, seen)
+    return full_battery_w(CAR, POLISH.maps, fuel, trip, SECONDS, seen)
 
 
 def highest_j(net_w, beyond_j: float) -> float:
@@ -118,7 +116,7 @@ def drive() -> Trajectory:
 def test_a_run_before_braking_charges_no_more_than_braking_leaves_room_for(monkeypatch) -> None:
     """A run of four seconds before it filled the battery: 2 % of the fuel for friction brakes."""
     now = drive()
-    monkeypatch.setattr("qpmpc.controllers.qp_planner.full_battery_w", lambda *_: np.inf)
+    monkeypatch.setattr("qpmpc.controllers.coming_second.full_battery_w", lambda *_: np.inf)
     before = drive()
     assert now.soc[-1] == pytest.approx(before.soc[-1], abs=1e-4)
     spared_g = before.fuel_g.sum() - now.fuel_g.sum()

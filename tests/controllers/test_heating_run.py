@@ -53,7 +53,8 @@ def power_w(
     must = np.append(float(held_s > 0), np.full(n - 1, must_share))
     trip = Stages(h, net_w, zero + SPEED_MPS, off, must, net_w, off, zero, zero, zero)
     seen = Observation(9, 0.6, t_cl_degc, engine_on, demand_w, SPEED_MPS, for_s, before_w)
-    return heating_run_w(car, polish, prices, trip, np.full(n, on_share), seen)
+    going_w, share = polish.power_w(prices, demand_w, 0.0), np.full(n, on_share)
+    return heating_run_w(car, polish.pieces, going_w, prices.internal, trip, share, seen)
 
 
 def lasts_from_degc(left_s: int = 30) -> float:
@@ -86,7 +87,9 @@ def test_it_goes_on_while_that_burns_no_more_than_another_run() -> None:
     """Another run is one of 4 s and its start; going on is some 5.6 s of idling fuel here."""
     lasts, engine, thermal = lasts_from_degc(), CAR.engine, CAR.thermal
     going_w = power_w(lasts - 0.1)
-    fuel_g_per_s = alpha_at(CAR.cold_engine, lasts) * float(POLISH[CAR].fuel(going_w))
+    fuel_g_per_s = alpha_at(CAR.cold_engine, lasts) * float(
+        POLISH[CAR].pieces.fuel_g_per_s(np.array(going_w))
+    )
     heat_w = engine_w(thermal, fuel_g_per_s * engine.lhv_j_per_g, going_w)
     k_per_s = heat_w / thermal.heat_capacity_j_per_k
     most_s = (engine.min_on_s * fuel_g_per_s + engine.start_fuel_g) / fuel_g_per_s
@@ -183,11 +186,10 @@ def test_no_more_than_ramp_and_battery_allow() -> None:
 
 def test_a_piece_on_which_heat_does_not_grow_bounds_nothing() -> None:
     """An engine that turns more fuel into work than it burns there: a wrong map, no division."""
-    fuel = POLISH[CAR].fuel
     flat = Polish(CAR, PwaModel.of(CAR))
-    slope = fuel.slope.copy()
+    slope = flat.pieces.slope.copy()
     slope[0] = 0.9 / (CAR.engine.lhv_j_per_g * alpha_at(CAR.cold_engine, 40.5))
-    flat.learn(replace(fuel, slope=slope))
+    flat.pieces = replace(flat.pieces, slope=slope)
     lack_k = 1.5 * heats_k(CAR, 0.0)
     asked_w = power_w(lasts_from_degc() - lack_k, prices=POOR, polish=flat)
     assert 0.0 < asked_w <= CAR.engine.power_max_w
@@ -214,7 +216,7 @@ def drive(made_in: str, trip: str = "train-095", car: str = "prius-nimh") -> Tra
 
 def test_a_run_before_the_arrival_is_spared(monkeypatch) -> None:
     now = drive("python")
-    monkeypatch.setattr("qpmpc.controllers.qp_planner.heating_run_w", lambda *_: 0.0)
+    monkeypatch.setattr("qpmpc.controllers.coming_second.heating_run_w", lambda *_: 0.0)
     before = drive("python")
     assert int(now.started.sum()) < int(before.started.sum())
     price_g = 117.0  # of a unit of SOC on this trip, dynamic programming's
@@ -226,7 +228,7 @@ def test_a_run_before_the_arrival_is_spared(monkeypatch) -> None:
 def test_a_cold_trip_ends_no_warmer_than_it_must(monkeypatch) -> None:
     """A free engine that idles for heat wasted 0.6 % of this trip's fuel in its last second."""
     now = drive("python", "random-8302-266s", "paper-nimh")
-    monkeypatch.setattr("qpmpc.controllers.qp_planner.heating_run_w", lambda *_: 0.0)
+    monkeypatch.setattr("qpmpc.controllers.coming_second.heating_run_w", lambda *_: 0.0)
     before = drive("python", "random-8302-266s", "paper-nimh")
     limit = FREE.thermal.t_cl_min_degc
     above_k = [float(run.t_cl_degc[-1]) - limit for run in (now, before)]

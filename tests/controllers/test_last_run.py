@@ -2,14 +2,15 @@
 
 import numpy as np
 import pytest
+from bare_seconds import going, second
 from short_trip import assert_same_commands, drive_in
 
 import qpmpc
 from qpmpc.codegen.c_compiler import compiler
+from qpmpc.controllers.last_run import last_run_w, last_start_w
 from qpmpc.cycles import Cycle, load_cycle
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa import PwaModel
-from qpmpc.qp.last_run import last_run_w, last_start_w
 from qpmpc.qp.polish import Polish, Prices
 from qpmpc.trajectory import Trajectory
 from qpmpc.vehicle import load_vehicle
@@ -46,7 +47,8 @@ def stages(
 
 def power_w(wanted_j: float, car=CAR, prices=PRICES, must_share: float = 0.0) -> float:
     trip, internal_w = stages(wanted_j, must_share)
-    return last_run_w(car.engine, POLISH, prices, trip, internal_w)
+    of_plan = going(POLISH, prices, trip, SECONDS)
+    return last_run_w(car.engine, of_plan, prices.fuel, trip, internal_w)
 
 
 GOING_W = POLISH.power_w(PRICES, DRIVING_W, 0.0)
@@ -69,7 +71,9 @@ def test_not_where_that_is_dearer_than_a_start() -> None:
     going_w = POLISH.power_w(cheap, DRIVING_W, 0.0)
     gain_w = POLISH.internal_w(DRIVING_W) - POLISH.internal_w(DRIVING_W - going_w)
     wanted_j = 3.5 * gain_w
-    dearer_g = (float(POLISH.fuel(going_w)) - value * gain_w) * wanted_j / gain_w
+    dearer_g = (
+        (float(POLISH.pieces.fuel_g_per_s(np.array(going_w))) - value * gain_w) * wanted_j / gain_w
+    )
     assert dearer_g > CAR.engine.start_fuel_g
     assert power_w(wanted_j, prices=cheap) == 0.0
     assert power_w(wanted_j, CAR.with_settings({"engine.start_fuel_g": 5.0}), cheap) == going_w
@@ -96,8 +100,8 @@ def test_not_for_nothing_beside_a_full_battery() -> None:
 
 
 USUAL = Prices(fuel=1.08, p_eng=0.0, internal=6.5e-5)  # under way, heat of fuel set off
-RUN = [POLISH.going(USUAL, FAST_W, POLISH.internal_w(FAST_W))] * CAR.engine.min_on_s
-RUN_J = sum(second.gain_w for second in RUN)
+RUN = [second(POLISH, USUAL, FAST_W)] * CAR.engine.min_on_s
+RUN_J = sum(each.gain_w for each in RUN)
 
 
 def start_w(
@@ -110,34 +114,35 @@ def start_w(
     prices=USUAL,
 ) -> float:
     """So many runs are wanted, each of what a shortest one gives now."""
-    gives_j = car.engine.min_on_s * POLISH.going(prices, now_w, POLISH.internal_w(now_w)).gain_w
+    gives_j = car.engine.min_on_s * second(POLISH, prices, now_w).gain_w
     trip, internal_w = stages(runs * gives_j, must_share, now_w, then_w, soon_share)
-    return last_start_w(car.engine, POLISH, prices, trip, internal_w, SECONDS)
+    of_plan = going(POLISH, prices, trip, SECONDS)
+    return last_start_w(car.engine, of_plan, prices.fuel, trip, internal_w)
 
 
 @pytest.mark.parametrize(
     ("runs", "begins"), [(0.4, False), (0.6, True), (1.0, True), (1.4, True), (1.6, False)]
 )
 def test_it_begins_where_a_shortest_run_pays_for_its_start(runs, begins) -> None:
-    assert sum(second.dearer_g_per_s for second in RUN) < -CAR.engine.start_fuel_g
+    assert sum(each.dearer_g_per_s for each in RUN) < -CAR.engine.start_fuel_g
     assert start_w(runs) == (RUN[0].power_w if begins else 0.0)
 
 
 @pytest.mark.parametrize(("of_start", "begins"), [(1.01, True), (0.99, False)])
 def test_it_pays_as_long_as_it_best_lasts(of_start, begins) -> None:
     """Ten seconds of it, then slow driving, for 0.85 of a start; four alone do not pay for one."""
-    second = POLISH.going(USUAL, 10e3, POLISH.internal_w(10e3))
-    slow = POLISH.going(USUAL, DRIVING_W, POLISH.internal_w(DRIVING_W))
-    assert second.dearer_g_per_s < 0.0 < slow.dearer_g_per_s
-    fuel_g = -10.0 * second.dearer_g_per_s / (0.85 * of_start)
+    good = second(POLISH, USUAL, 10e3)
+    slow = second(POLISH, USUAL, DRIVING_W)
+    assert good.dearer_g_per_s < 0.0 < slow.dearer_g_per_s
+    fuel_g = -10.0 * good.dearer_g_per_s / (0.85 * of_start)
     car = CAR.with_settings({"engine.start_fuel_g": fuel_g})
-    assert -4.0 * second.dearer_g_per_s < 0.5 * fuel_g
+    assert -4.0 * good.dearer_g_per_s < 0.5 * fuel_g
     assert (start_w(1.0, car, now_w=10e3) > 0.0) is begins
 
 
 def test_it_waits_for_better_seconds() -> None:
     """Slow driving does not pay for a start; what the plan wants later, it may get at less cost."""
-    easy = POLISH.going(USUAL, DRIVING_W, POLISH.internal_w(DRIVING_W))
+    easy = second(POLISH, USUAL, DRIVING_W)
     assert 4.0 * easy.dearer_g_per_s > -CAR.engine.start_fuel_g
     assert start_w(1.0, now_w=DRIVING_W) == 0.0
     assert start_w(1.0, then_w=FAST_W + 4e3) == 0.0
@@ -171,7 +176,7 @@ def drive(made_in: str) -> Trajectory:
 def test_a_start_before_the_arrival_is_spared(monkeypatch) -> None:
     """Two and a half minutes; without it the last run is one too many."""
     now = drive("python")
-    monkeypatch.setattr("qpmpc.controllers.qp_planner.last_run_w", lambda *_: 0.0)
+    monkeypatch.setattr("qpmpc.controllers.coming_second.last_run_w", lambda *_: 0.0)
     before = drive("python")
     starts = [int(run.started.sum()) for run in (now, before)]
     assert starts[0] == starts[1] - 1
@@ -188,7 +193,7 @@ def test_c_goes_on_as_python_does() -> None:
 def test_the_last_run_begins_while_the_car_drives(monkeypatch) -> None:
     """Without it the last start is at standstill before arrival."""
     now = drive("python")
-    monkeypatch.setattr("qpmpc.controllers.qp_planner.last_start_w", lambda *_: 0.0)
+    monkeypatch.setattr("qpmpc.controllers.coming_second.last_start_w", lambda *_: 0.0)
     before = drive("python")
     last = [int(np.flatnonzero(run.started)[-1]) for run in (now, before)]
     assert now.demand_w[last[0]] > 5e3 > before.demand_w[last[1]]
@@ -201,7 +206,8 @@ def test_it_is_left_out_where_the_power_is_not_polished(monkeypatch) -> None:
     for polish in (False, True):
         asked = []
         monkeypatch.setattr(
-            "qpmpc.controllers.qp_planner.last_run_w", lambda *_, of=asked: float(of.append(1) or 0)
+            "qpmpc.controllers.coming_second.last_run_w",
+            lambda *_, of=asked: float(of.append(1) or 0),
         )
         settings = {"mh_qp.implementation": "python", "mh_qp.polish": polish}
         run = qpmpc.simulate(part, "mh-qp", settings=settings)

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
+from bare_seconds import bare_stages, going, second
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from short_trip import assert_same_commands, drive_in
 
 from qpmpc.codegen.c_compiler import compiler
+from qpmpc.controllers.last_run import SAME_G
 from qpmpc.controllers.short_run import short_run_w
-from qpmpc.preview.stages import Stages
 from qpmpc.pwa import PwaModel
-from qpmpc.qp.last_run import SAME_G
 from qpmpc.qp.polish import Polish, Prices
 from qpmpc.trajectory import Trajectory
 from qpmpc.vehicle import load_vehicle
@@ -26,17 +26,14 @@ REST = [STANDING_W] * (SECONDS - 4)
 def early_w(net_w, on_share, must=(), car=CAR, prices=PRICES, seconds=SECONDS) -> float:
     """Return the power at which a run begins now; what is not given of the seconds is 0."""
     count = len(net_w)
-    off_w = np.array([POLISH.internal_w(w) for w in net_w])
-    zero = np.zeros(count)
-    must_share = np.isin(np.arange(count), must).astype(float)
-    h = (np.arange(count) < seconds).astype(float)
-    trip = Stages(h, np.array(net_w), zero + 8.0, off_w, must_share, zero, off_w, zero, zero, zero)
+    trip = bare_stages(POLISH, net_w, must, seconds)
     share = np.append(on_share, np.zeros(count - len(on_share)))
-    return short_run_w(car.engine, POLISH, prices, trip, share)
+    of_plan = going(POLISH, prices, trip, count)
+    return short_run_w(car.engine, of_plan, prices.fuel, trip, share)
 
 
 def dearer_g(net_w: float) -> float:
-    return POLISH.going(PRICES, net_w, POLISH.internal_w(net_w)).dearer_g_per_s
+    return second(POLISH, PRICES, net_w).dearer_g_per_s
 
 
 LAUNCH = [DRIVING_W, DRIVING_W, LAUNCH_W, LAUNCH_W, *REST]
@@ -132,7 +129,7 @@ def drive(made_in: str) -> Trajectory:
 def test_c_begins_as_python_does(monkeypatch) -> None:
     """Three minutes; without it two runs go on for a second of slow driving."""
     now, in_c = drive("python"), drive("c")
-    monkeypatch.setattr("qpmpc.controllers.qp_planner.short_run_w", lambda *_: 0.0)
+    monkeypatch.setattr("qpmpc.controllers.coming_second.short_run_w", lambda *_: 0.0)
     before = drive("python")
     assert_same_commands(now, in_c)
     taken, left = now.engine_on & ~before.engine_on, before.engine_on & ~now.engine_on

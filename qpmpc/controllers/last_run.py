@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.preview.stages import Stages
-from qpmpc.qp.polish import Polish, Prices
+from qpmpc.pwa.priced import Going
 from qpmpc.qp.rows import table_of
 from qpmpc.vehicle.engine_parameters import Engine
 
@@ -29,8 +29,8 @@ MUST_LEAST_S = 1e-3  # less is rounding: no second ahead has to run
 
 def last_run_w(
     engine: Engine,
-    polish: Polish,
-    prices: Prices,
+    going: Going,
+    fuel_g_per_g: float,
     stages: Stages,
     internal_w: NDArray[np.float64],
 ) -> float:
@@ -50,28 +50,28 @@ def last_run_w(
     Parameters
     ----------
     engine : gives b and c
-    polish, prices : of the plan
+    going : the seconds ahead with the engine on
+    fuel_g_per_g : w_F, what a gram of fuel costs in the coming second
     stages : of the plan, from now on
     internal_w : G, internal battery power of each stage by the plan, shape (n,)
     """
     if not table_of(engine).has_start or stages.must_s > MUST_LEAST_S:
         return 0.0
-    going = polish.going_in(prices, stages, 0)
-    if going.gain_w < LEAST_GAIN_W or prices.fuel < FUEL_LEAST:
+    power_w, gain_w, dearer_g_per_s = (float(each[0]) for each in going)
+    if gain_w < LEAST_GAIN_W or fuel_g_per_g < FUEL_LEAST:
         return 0.0
-    wanted_s = wanted_j(stages, internal_w) / going.gain_w
+    wanted_s = wanted_j(stages, internal_w) / gain_w
     is_one_run = WANTED_LEAST * engine.min_on_s <= wanted_s <= engine.min_on_s
-    pays = going.dearer_g_per_s * wanted_s <= engine.start_fuel_g
-    return going.power_w if is_one_run and pays else 0.0
+    pays = dearer_g_per_s * wanted_s <= engine.start_fuel_g
+    return power_w if is_one_run and pays else 0.0
 
 
 def last_start_w(
     engine: Engine,
-    polish: Polish,
-    prices: Prices,
+    going: Going,
+    fuel_g_per_g: float,
     stages: Stages,
     internal_w: NDArray[np.float64],
-    short_stages: int,
 ) -> float:
     """Return the power at which the last run begins; 0 if it need not.
 
@@ -89,28 +89,26 @@ def last_start_w(
 
     Parameters
     ----------
-    engine, polish, prices, stages, internal_w : as of `last_run_w`
-    short_stages : how many stages are seconds
+    engine, going, fuel_g_per_g, stages, internal_w : as of `last_run_w`
     """
-    run_s = engine.min_on_s
+    run_s, short_stages = engine.min_on_s, len(going.power_w)
     asked = table_of(engine).has_start and stages.must_s <= MUST_LEAST_S
     lasts = 0 < run_s <= len(stages.seconds_w(short_stages))
-    if not asked or not lasts or prices.fuel < FUEL_LEAST:
+    if not asked or not lasts or fuel_g_per_g < FUEL_LEAST:
         return 0.0
 
-    run = [polish.going_in(prices, stages, k) for k in range(run_s)]
-    gives_j = sum(second.gain_w for second in run)
+    gives_j = float(going.gain_w[:run_s].sum())
     of_all_j = wanted_j(stages, internal_w)
     is_one_run = START_LEAST * gives_j <= of_all_j <= START_MOST * gives_j
     is_soon = wanted_j(stages, internal_w, short_stages) >= START_SOON * of_all_j
     if not (is_one_run and is_soon):
         return 0.0
-    rest = [polish.going_in(prices, stages, k) for k in range(run_s, short_stages)]
-    dearer_g = stages.duration_s[:short_stages] * [second.dearer_g_per_s for second in run + rest]
+    dearer_g = stages.duration_s[:short_stages] * going.dearer_g_per_s
     runs_g = np.convolve(dearer_g, np.ones(run_s), "valid")
     goes_on_g = np.cumsum(dearer_g[run_s:]).min(initial=0.0)
     pays = runs_g[0] + goes_on_g <= -START_PAYS * engine.start_fuel_g
-    return run[0].power_w if pays and runs_g[0] <= runs_g.min() + SAME_G else 0.0
+    begins = pays and runs_g[0] <= runs_g.min() + SAME_G
+    return float(going.power_w[0]) if begins else 0.0
 
 
 def wanted_j(
