@@ -249,7 +249,7 @@ def test_what_does_not_fit_generated_code_is_refused():
 def documented(car: str) -> list[float]:
     """Instructions, flash and RAM of docs/embedded.md, of the default horizon in f32."""
     text = (Path(__file__).parents[2] / "docs" / "embedded.md").read_text("utf-8")
-    row = re.search(rf"^\| `{car}`[^|]*\| f32 \| 80 \(default\) \| \d \|(.+)\|$", text, re.MULTILINE)
+    row = re.search(rf"^\| `{car}`[^|]*\| f32 \| 80 \(default\) \| \d \|(.+)\|$", text, re.M)
     assert row
     return [float(cell.replace(",", "")) for cell in row[1].split("|")]
 
