@@ -8,7 +8,8 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-mpc_real mpc_battery_run_w(const mpc_state *state, const mpc_going *second)
+mpc_real mpc_battery_run_w(const mpc_state *state, const mpc_real *on_share,
+                           const mpc_going *second)
 {
     const int32_t run_s = (mpc_par.min_on_s > 1) ? mpc_par.min_on_s : 1;
     const mpc_real to_spare = state->watch.good.soc - (state->cal.soc_min + SOC_MARGIN);
@@ -23,7 +24,7 @@ mpc_real mpc_battery_run_w(const mpc_state *state, const mpc_going *second)
         const mpc_stage *const stage = &state->stage[k];
         const mpc_real h = stage->road.duration_s;
         const mpc_real threshold = state->cal.on_threshold;
-        rest *= above(threshold, stage->x[MPC_VAR_ON]) * above(REAL(0.5), stage->road.must_share);
+        rest *= above(threshold, on_share[k]) * above(REAL(0.5), stage->road.must_share);
         may_begin[k] = rest * (REAL(1.0) - above(lack_j, REAL(0.0)));
         spent_j += h * stage->road.internal_off_w;
         lack_j = real_max(lack_j, rest * spent_j);

@@ -6,7 +6,7 @@
 #include "mpc_real.h"
 
 mpc_real mpc_coming_least_w(const mpc_state *state, const mpc_prices *prices,
-                            const mpc_going *second, mpc_real room_w)
+                            const mpc_real *on_share, const mpc_going *second, mpc_real room_w)
 {
     const mpc_real power_w = second[0].power_w;
     const mpc_real ramp_w = mpc_ramp_least_w(state);
@@ -15,8 +15,10 @@ mpc_real mpc_coming_least_w(const mpc_state *state, const mpc_prices *prices,
 #if MPC_STARTS
     least_w = real_max(least_w, mpc_last_run_w(state, prices, &second[0]));
     least_w = real_max(least_w, mpc_last_start_w(state, prices, second));
-    least_w = real_max(least_w, mpc_short_run_w(state, prices, second));
-    least_w = real_max(least_w, mpc_battery_run_w(state, second));
+    least_w = real_max(least_w, mpc_short_run_w(state, prices, on_share, second));
+    least_w = real_max(least_w, mpc_battery_run_w(state, on_share, second));
+#else
+    (void)on_share;
 #endif
     return real_max(least_w, mpc_heating_run_w(state, prices, power_w));
 }

@@ -113,7 +113,7 @@ mpc_real mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p
     const mpc_prices prices = prices_now(state);
     const mpc_real room_w = mpc_full_battery_w(state, &prices);
     p_eng_w[0] = real_min(p_eng_w[0], on_share[0] * room_w);
-    return mpc_coming_least_w(state, &prices, second, room_w);
+    return mpc_coming_least_w(state, &prices, on_share, second, room_w);
 }
 
 void mpc_method_report(const mpc_state *state, mpc_out *out)

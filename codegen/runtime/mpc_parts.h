@@ -21,7 +21,7 @@ typedef struct {
 typedef struct {
     mpc_real power_w;
     mpc_real gain_w; /* of the battery's store */
-    mpc_real dearer; /* g/s at the plan's prices */
+    mpc_real dearer; /* g at the plan's prices; of a second behind arrival nothing by costates */
 } mpc_going;
 
 /* mpc_maps.c: maps of engine and battery */
@@ -72,13 +72,13 @@ mpc_going mpc_polish_going(const mpc_state *state, const mpc_prices *prices, int
 /* mpc_full_battery.c: the most power of the coming second for which the battery has room. */
 mpc_real mpc_full_battery_w(const mpc_state *state, const mpc_prices *prices);
 
-/* mpc_coming_second.c: the power that the coming second gets at least by the rules below, of the seconds
- * ahead with the engine on; of the first alone where a start costs nothing. room_w is that of
- * mpc_full_battery.c. */
+/* mpc_coming_second.c: the power that the coming second gets at least by the rules below, of the on-shares
+ * of the seconds ahead as they will be realised, and of these with the engine on; of the first alone where
+ * a start costs nothing. room_w is that of mpc_full_battery.c. */
 mpc_real mpc_coming_least_w(const mpc_state *state, const mpc_prices *prices,
-                            const mpc_going *second, mpc_real room_w);
+                            const mpc_real *on_share, const mpc_going *second, mpc_real room_w);
 
-/* Where the coming second runs beside the plan, at its least-cost power power_w (mpc_polish.c); 0
+/* Where the coming second runs beside the plan, at its least-cost power power_w; 0
  * elsewhere. mpc_empty_battery.c: where the battery or the ramp needs the engine, with the ramp's power
  * at least. mpc_last_run.c: where a run goes on for all that the plan still wants, or begins for it in
  * time. mpc_battery_run.c: where one goes on or begins for what the battery lacks in the seconds ahead.
@@ -89,8 +89,10 @@ mpc_real mpc_empty_battery_w(const mpc_state *state, mpc_real power_w, mpc_real 
 mpc_real mpc_last_run_w(const mpc_state *state, const mpc_prices *prices, const mpc_going *now);
 mpc_real mpc_last_start_w(const mpc_state *state, const mpc_prices *prices,
                           const mpc_going *second);
-mpc_real mpc_battery_run_w(const mpc_state *state, const mpc_going *second);
-mpc_real mpc_short_run_w(const mpc_state *state, const mpc_prices *prices, const mpc_going *second);
+mpc_real mpc_battery_run_w(const mpc_state *state, const mpc_real *on_share,
+                           const mpc_going *second);
+mpc_real mpc_short_run_w(const mpc_state *state, const mpc_prices *prices, const mpc_real *on_share,
+                         const mpc_going *second);
 mpc_real mpc_heating_run_w(const mpc_state *state, const mpc_prices *prices, mpc_real power_w);
 
 /* mpc_ramp.c: what the ramp asks of the coming second */

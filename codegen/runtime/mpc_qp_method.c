@@ -87,7 +87,7 @@ mpc_real mpc_method_plan(const mpc_state *state, mpc_real *on_share, mpc_real *p
     const mpc_going second[1] = {
         {mpc_polish_power_w(state, &prices, 0, REAL(0.0)), REAL(0.0), REAL(0.0)}};
 #endif
-    return mpc_coming_least_w(state, &prices, second, room_w);
+    return mpc_coming_least_w(state, &prices, on_share, second, room_w);
 }
 
 void mpc_method_report(const mpc_state *state, mpc_out *out)

@@ -7,7 +7,8 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-mpc_real mpc_short_run_w(const mpc_state *state, const mpc_prices *prices, const mpc_going *second)
+mpc_real mpc_short_run_w(const mpc_state *state, const mpc_prices *prices, const mpc_real *on_share,
+                         const mpc_going *second)
 {
     const int32_t run_s = mpc_par.min_on_s;
     const mpc_real shortest_s = (mpc_real)run_s;
@@ -22,11 +23,11 @@ mpc_real mpc_short_run_w(const mpc_state *state, const mpc_prices *prices, const
     mpc_real seconds = REAL(0.0); /* to arrival */
     for (int32_t k = 0; k < MPC_SHORT; k++) {
         const mpc_stage *const stage = &state->stage[k];
-        runs[k] = REAL(1.0) - above(threshold, stage->x[MPC_VAR_ON]);
+        runs[k] = REAL(1.0) - above(threshold, on_share[k]);
         rest *= REAL(1.0) - runs[k];
         rests[k] = rest;
         const mpc_real on = REAL(1.0) - rest;
-        const mpc_real share = real_clip(stage->x[MPC_VAR_ON], REAL(0.0), REAL(1.0));
+        const mpc_real share = real_clip(on_share[k], REAL(0.0), REAL(1.0));
         share_s += (on * above(shortest_s, ran_s)) * share;
         must += (on * above(REAL(0.5), ran_s)) * stage->road.must_share;
         first_s += rest;

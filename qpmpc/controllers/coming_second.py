@@ -34,7 +34,8 @@ class Coming:
     Attributes
     ----------
     stages : from now on
-    on_share, internal_w : sigma and G of each, shape (n,)
+    on_share, internal_w : sigma and G of each by the plan, shape (n,)
+    shares : sigma of the seconds ahead, as they will be realised, shape (N,)
     going : the seconds ahead with the engine on, shape (N,)
     fuel_g_per_g, store_g_per_j : w_F and w_G of the coming second
     """
@@ -42,6 +43,7 @@ class Coming:
     stages: Stages
     on_share: Floats
     internal_w: Floats
+    shares: Floats
     going: Going
     fuel_g_per_g: float
     store_g_per_j: float
@@ -74,7 +76,7 @@ def least_w(
     """
     engine, stages, going = vehicle.engine, coming.stages, coming.going
     plan = (engine, going, coming.fuel_g_per_g, stages)
-    shares = coming.on_share[: len(going.power_w)]
+    shares = coming.shares
     power_w, net_w = float(going.power_w[0]), float(stages.net_w[0])
     empty_w = empty_battery_w(vehicle.battery, maps, net_w, seen.soc, min(power_w, room_w), ramp_w)
     if seen.engine_on:

@@ -12,7 +12,7 @@ from qpmpc.controllers.ramp import RampFloor
 from qpmpc.controllers.receding_horizon import Plan, Planner
 from qpmpc.controllers.settings import SettingsLike
 from qpmpc.costate.certificate import Followed, Layout, choose, follow, violation_price_g
-from qpmpc.costate.dual import Multipliers, StageCosts, stage_prices
+from qpmpc.costate.dual import Dual, Multipliers, StageCosts, stage_prices
 from qpmpc.costate.path import Shortest
 from qpmpc.costate.program import USUAL_CHARGE, Program, ProgramBuilder, unit_g
 from qpmpc.costate.solve import newton
@@ -228,19 +228,18 @@ class MhCostate(Planner):
         x[:, Var.ON], x[:, Var.START] = followed.on_share, followed.starts
         x[:, Var.P_ENG], x[:, Var.FUEL] = followed.power_w, followed.fuel_g_per_s
         x[:, Var.INTERNAL] = followed.internal_w
-        coming = _coming(stages, program, found.at, costs, x)
+        coming = _coming(stages, program, found, costs, x)
         of_dual = (found.at, found.share, power_w)
         return CostatePlan(stages, program, *of_dual, followed, choice.bound_g, x, coming)
 
 
-def _coming(
-    stages: Stages, program: Program, at: Multipliers, costs: StageCosts, x: Floats
-) -> Coming:
+def _coming(stages: Stages, program: Program, found: Dual, costs: StageCosts, x: Floats) -> Coming:
     """Return what the rules of the coming second know of a plan: each second at its own prices."""
-    p, short = program, program.short
-    prices = stage_prices(p, at, costs.nu)
+    short = program.short
+    prices = stage_prices(program, found.at, costs.nu)
     seconds = StagePrices(*(each[:short] for each in prices))
     on = Least(*(each[:short] for each in costs.on))
     ahead = going(on, stages.internal_off_w[:short], seconds)
     fuel, store = float(prices.fuel[0]), float(prices.internal[0])
-    return Coming(stages, x[:, Var.ON], x[:, Var.INTERNAL], ahead, fuel, store)
+    of_plan = (stages, x[:, Var.ON], x[:, Var.INTERNAL], found.share[:short], ahead)
+    return Coming(*of_plan, fuel, store)

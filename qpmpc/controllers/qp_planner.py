@@ -208,7 +208,8 @@ class QpPlanner(Planner):
         short = slice(self.of_qp.horizon.short_stages)
         going = self._polish.going(prices, stages.net_w[short], stages.internal_off_w[short])
         on_share, internal_w = x[:, Var.ON], x[:, Var.INTERNAL]
-        return Coming(stages, on_share, internal_w, going, prices.fuel, prices.internal)
+        of_plan = (stages, on_share, internal_w, on_share[short], going)
+        return Coming(*of_plan, prices.fuel, prices.internal)
 
     def solve(self, seen: Observation) -> QpPlan:
         """Solve the QP of this second, from the last usable solution, shifted along.

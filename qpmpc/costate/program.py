@@ -13,6 +13,7 @@ from qpmpc.pwa.model import PwaModel
 from qpmpc.qp.expressions import code_of, parsed, targets_of
 from qpmpc.qp.linearisation import Linearisation
 from qpmpc.qp.quantities import Quantities
+from qpmpc.qp.rows import table_of
 from qpmpc.qp.scaling import ScalingSettings
 from qpmpc.qp.settings import LimitSettings, QpSettings
 from qpmpc.qp.stage_qp import qp_parameters
@@ -47,7 +48,7 @@ _PROGRAM_CODE = code_of(parsed(PROGRAM))
 # where they cost, through it.
 SWITCH_G_PER_S, LONG_SWITCH_G_PER_S = 0.03, 0.05
 START_SWITCH_G_PER_S, START_LONG_SWITCH_G_PER_S = 0.01, 0.015
-LEAST_SWITCH_G = 1e-4  # of a masked stage
+LEAST_SWITCH_G = 1e-4  # of a masked stage, or one in which a charge is worth next to nothing
 LEAST_WORTH = 0.1  # of these costs, where a charge is worth nearly nothing
 USUAL_CHARGE = 1.3  # lambda of a usual trip, in fuel of the engine at its best
 
@@ -173,6 +174,7 @@ class ProgramBuilder:
         self._curves = Curves.of(vehicle, model.line)
         self._shared = self._curves.envelope()
         self._usual_g = USUAL_CHARGE * unit_g(model)
+        self._has_start = table_of(vehicle.engine).has_start
 
     def at(
         self,
@@ -212,10 +214,9 @@ class ProgramBuilder:
         forced = np.where(must, 0.0, stages.must_share)
         rises = stages.rises * (1.0 - forced)
         rises[1:] *= 1.0 - forced[:-1]
-        has_start = number["start_fuel_g"] > 0.0 or number["cranking_j"] > 0.0
         usual_g = np.full(count, self._usual_g) if charge_g is None else charge_g
         worth = np.clip(usual_g / self._usual_g, LEAST_WORTH, 1.0)
-        second, longer = switches_g_per_s(has_start)
+        second, longer = switches_g_per_s(self._has_start)
         width = np.where(stages.duration_s > 1.0, longer, second) * stages.duration_s
         price_t = growing.copy()
         price_t[:-1] += growing[1:]

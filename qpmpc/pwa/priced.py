@@ -55,7 +55,8 @@ class Going(NamedTuple):
     ----------
     power_w : E
     gain_w : g = l(P0) - l(P0 - E), what the battery's store gains by it
-    dearer_g_per_s : d = w_F f(E) + w_E E - w_G g, what it costs more at the plan's prices
+    dearer_g_per_s : d = w_F f(E) + w_E E - w_G g, what it costs more at the plan's prices; by those
+        of the second itself nothing behind arrival
     """
 
     power_w: Floats
