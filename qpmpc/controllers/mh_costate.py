@@ -43,8 +43,8 @@ class MhCostateSettings(BaseModel):
     horizon : layout of the stages, as of `mh_qp`, but `entry_share` is 0: blocks are apart
     limits : terminal band and margins, as of `mh_qp.qp`; it comes nearer to a limit than an
         iteration that is stopped, and needs less of a margin to it
-    rounds : Newton rounds of a second; if not given `ROUNDS`, or `START_ROUNDS` where a start costs
-        something: there a round is more work, and a plan gains less by one more
+    rounds : Newton rounds of a second; if not given 5, or 4 where a start costs something: there a
+        round is more work, and a plan gains less by one more
     implementation : as of `mh_qp`
     """
 
