@@ -40,6 +40,10 @@ class Prices(NamedTuple):
     p_eng: float
     internal: float
 
+    def of_each(self, count: int) -> StagePrices:
+        """Return them as those of so many seconds."""
+        return StagePrices(*(np.full(count, each) for each in self))
+
 
 class Polish:
     """Least-cost engine power of a second, engine on.
@@ -93,8 +97,8 @@ class Polish:
 
     def going(self, prices: Prices, net_w: Floats, off_w: Floats) -> Going:
         """Return seconds of net power P0 and internal power with the engine off l(P0)."""
-        at = StagePrices(*(np.full(len(net_w), each) for each in prices))
-        return going(self._least(prices, net_w, 0.0), off_w, at)
+        on = self._least(prices, net_w, 0.0)
+        return going(on, off_w, prices.of_each(len(net_w)))
 
     def _least(self, prices: Prices, net_w: Floats, planned_w: float) -> Least:
         vehicle, engine = self._vehicle, self._vehicle.engine
@@ -104,5 +108,4 @@ class Polish:
         if not prices.internal > 0.0:
             low_w = high_w = np.full(len(net_w), planned_w)
             prices = prices._replace(internal=1.0)
-        at = StagePrices(*(np.full(len(net_w), each) for each in prices))
-        return least(self.curves, net_w, low_w, high_w, at)
+        return least(self.curves, net_w, low_w, high_w, prices.of_each(len(net_w)))

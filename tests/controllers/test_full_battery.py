@@ -1,7 +1,10 @@
 """A second leaves room in the battery for the braking to come."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from bare_seconds import bare_stages
 from hypothesis import given
 from hypothesis import strategies as st
 from short_trip import assert_same_commands, drive_in
@@ -10,7 +13,6 @@ from qpmpc.codegen.c_compiler import compiler
 from qpmpc.controllers.full_battery import full_battery_w
 from qpmpc.controllers.last_run import FUEL_LEAST
 from qpmpc.controllers.safety import SOC_MARGIN
-from qpmpc.preview.stages import Stages
 from qpmpc.pwa import PwaModel
 from qpmpc.qp.polish import Polish
 from qpmpc.trajectory import Trajectory
@@ -28,13 +30,9 @@ BRAKING = [15e3, *[4e3] * 3, *[-12e3] * 10, *[4e3] * 6]
 
 def most_w(net_w, soc: float, fuel: float = 1.0, beyond_j: float = 0.0) -> float:
     """Return the most power; the last second of the short horizon has the room for what follows."""
-    count = len(net_w)
-    off_w = np.array([POLISH.internal_w(w) for w in net_w])
-    zero, rise_j = np.zeros(count), np.zeros(count)
+    rise_j = np.zeros(len(net_w))
     rise_j[SECONDS - 1] = beyond_j
-    trip = Stages(
-        zero + 1.0, np.array(net_w), zero + SPEED_MPS, off_w, zero, zero, off_w, zero, zero, rise_j
-    )
+    trip = replace(bare_stages(POLISH, net_w, speed_mps=SPEED_MPS), rise_j=rise_j)
     seen = Observation(9, soc, 60.0, True, net_w[0] - AUX_W, SPEED_MPS, 9, 10e3)
     return full_battery_w(CAR, POLISH.maps, fuel, trip, SECONDS, seen)
 
