@@ -96,7 +96,7 @@ rise_share|1|share of the rises of demand in a block that are taken for starts
 OF_SEARCH = """
 search_least_rise_g|g|rise of the dual from which on a round counts
 search_first_share|1|share of the way to its aim that the first round tries
-search_switch_g_per_s|g/s|cost over which on and off are smoothed, at a usual price of SOC
+search_switch_g_per_s|g/s|cost over which on and off are smoothed, at a usual price of SOC and power
 search_long_switch_g_per_s|g/s|the same, longer stages
 """
 DESCRIBED = {  # unit and text of every entry, by name

@@ -12,7 +12,6 @@ from qpmpc.controllers.mh_costate import MhCostateSettings, most_charge_g
 from qpmpc.controllers.settings import RuleBasedSettings
 from qpmpc.costate import certificate, dual, funnel, program, solve
 from qpmpc.costate.path import Shortest
-from qpmpc.costate.solve import moderate
 from qpmpc.errors import InputError
 from qpmpc.pwa import priced
 from qpmpc.pwa.curves import Curves
@@ -34,8 +33,7 @@ CONSTANTS = CONSTANTS_OF_ALL | of_modules(
     (funnel, "ENDLESS_RESPONSE LEAST_RESPONSE UNLIMITED"),
     (
         solve,
-        "CHARGE_QUARTER_STEPS HEAT_QUARTER_STEPS BACKGROUND LEAST_DECAY AT_SLACK MOST_SHARE GROWS"
-        " SHRINKS STREAK",
+        "CHARGE_QUARTER_STEPS BACKGROUND LEAST_DECAY AT_SLACK MOST_SHARE GROWS SHRINKS STREAK",
     ),
     (certificate, "ABOVE_MULTIPLIERS"),
 )
@@ -74,7 +72,7 @@ def costate_values_of(
             f"mh_costate.horizon.short_stages={settings.horizon.short_stages}"
         )
     table = table_of(engine)
-    moderate_w, moderate_g_per_s = moderate(curves)
+    moderate_w, moderate_g_per_s = program.moderate(curves)
     limits = QpSettings(**settings.limits.model_dump())
     scalars = {
         **qp_parameters(vehicle, model, limits, ScalingSettings()),
@@ -108,7 +106,7 @@ def costate_values_of(
         constants=CONSTANTS
         | of_modules(
             (program, "LEAST_SWITCH_G LEAST_WORTH"),
-            (dual, "EDGE NEAR_K" + (" START_QUARTER_STEPS" if table.has_start else "")),
+            (dual, "EDGE" + (" START_QUARTER_STEPS" if table.has_start else "")),
         ),
         costate={
             "SHARED_PIECES": len(envelope.slope),

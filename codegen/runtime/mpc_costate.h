@@ -30,7 +30,8 @@ typedef struct {
     mpc_real least_of_heat;
     mpc_costate_part part[MPC_PARTS];
     mpc_real off_charge; /* SOC that the free seconds take with the engine off */
-    mpc_real width;      /* cost over which on and off are smoothed, g */
+    mpc_real widest;     /* cost over which on and off are smoothed, g: at most, */
+    mpc_real width;      /* and W */
     mpc_real per_width;  /* 1 / width */
     mpc_real must;       /* 1 where the engine has to run all the time, else 0 */
     mpc_real cannot;     /* 1 where it must not, else 0 */
@@ -84,11 +85,20 @@ typedef struct {
     mpc_real offset;
     mpc_real response;
     mpc_real limit[2]; /* of the sum: lower, upper */
-    mpc_real bound[2]; /* of the price, by these limits, on the way */
-    mpc_real decay;
-    mpc_real beyond; /* price where a walk cut short does not come, where terms decay */
-    mpc_real price;  /* found */
+    mpc_real price;    /* found */
 } mpc_costate_term;
+
+/* Terms of one that decays, see mpc_costate_scan.c: one of them, or those of a stretch. */
+typedef struct {
+    mpc_real offset;
+    mpc_real response;
+    mpc_real decay;
+    mpc_real limit; /* of the sum after the last of them */
+    mpc_real side;  /* 1 a lower limit, -1 an upper one, 0 none */
+    mpc_real price; /* of a stretch whose limit is met, */
+    mpc_real jump;  /* that less the next one's: the limit's multiplier; */
+    int32_t at;     /* its last term, from 1 */
+} mpc_costate_stretch;
 
 typedef struct {
     mpc_stage_road road;
@@ -108,9 +118,11 @@ typedef struct {
 
 /* The search. */
 typedef struct {
-    mpc_costate_term
-        term[MPC_STAGES + 2]; /* after the last, one that ends the walk, one for waste */
-    mpc_real value[2];        /* of the duals, and the part that no stage has */
+    mpc_costate_term term[MPC_STAGES + 1]; /* after the last, one that ends the walk */
+    mpc_costate_stretch
+        stretch[MPC_STAGES + 2]; /* before the terms one that is none, after them one that ends */
+    int32_t met;                 /* the last stretch whose limit is met */
+    mpc_real value[2];           /* of the duals, and the part that no stage has */
     mpc_real constant_g[2];
     mpc_real share; /* of the way to the aim that is tried next */
     int32_t streak; /* rounds in a row that rose */

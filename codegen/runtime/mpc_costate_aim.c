@@ -10,7 +10,7 @@
 #include "mpc_model.h"
 #include "mpc_real.h"
 
-#define NO_LIMIT REAL(1.0e9)
+#define DECIDES REAL(1.0e12) /* K a g/K: of a multiplier, against the distance of the limits */
 #define SOC_TERMS (MPC_SHORT + MPC_BLOCKS)
 
 /* Some stages as one term. The response is that of the stages and, lest there be none, of one that
@@ -68,7 +68,6 @@ static void aim_charge(mpc_state *state)
 static void aim_heat(mpc_state *state)
 {
     const int32_t which = state->search.here;
-    mpc_costate_term *const term = state->search.term;
     const mpc_real slack = state->cal.slack_g_per_k;
     const mpc_real most = AT_SLACK * slack;
     const mpc_real of_charge =
@@ -76,6 +75,7 @@ static void aim_heat(mpc_state *state)
     mpc_real change = REAL(0.0); /* M of the limits given up less that of the multipliers now */
     for (int32_t k = MPC_STAGES - 1; k >= 0; k--) {
         mpc_stage *const stage = &state->stage[k];
+        mpc_costate_stretch *const term = &state->search.stretch[k + 1];
         const mpc_costate_program *const p = &stage->p;
         const mpc_costate_dual *const dual = &stage->dual[which];
         const mpc_real low = p->of.t_low - dual->t_cl_k;
@@ -84,39 +84,40 @@ static void aim_heat(mpc_state *state)
         const mpc_real is_cold = not_below(dual->heat, most) * above(low, REAL(0.0));
         const mpc_real is_hot = not_below(-most, dual->heat) * above(REAL(0.0), high);
         const mpc_real given = slack * (is_cold - is_hot);
+        /* that which has a multiplier, else the nearer: by a sum whose sign the multiplier decides */
+        const mpc_real lower = not_below((dual->heat * DECIDES) + (low + high), REAL(0.0));
         const mpc_real more = of_charge * dual->cross * (stage->goal_charge - dual->charge);
         stage->given_heat = given;
         change += given - dual->heat;
-        term[k].response = (dual->of_heat + p->least_of_heat) * p->per_end * p->per_end;
-        term[k].offset = (more * p->per_end) + (term[k].response * change);
-        /* one that has a multiplier now is aimed at from either side */
-        term[k].limit[0] = pick(dual->heat < REAL(0.0), high, low) - (NO_LIMIT * is_cold);
-        term[k].limit[1] = pick(dual->heat > REAL(0.0), low, high) + (NO_LIMIT * is_hot);
-        term[k].decay = p->decay;
-        term[k].beyond = -change;
-        term[k].price = MPC_NO_PRICE;
+        term->response = (dual->of_heat + p->least_of_heat) * p->per_end * p->per_end;
+        term->offset = (more * p->per_end) + (term->response * change);
+        term->limit = blend(lower, low, high);
+        const mpc_real is_limit = not_below(term->response, LEAST_RESPONSE)
+                                  * (REAL(1.0) - (is_cold + is_hot));
+        term->side = ((lower + lower) - REAL(1.0)) * is_limit;
+        term->decay = p->decay;
         change *= p->decay;
     }
-    mpc_costate_funnel_decaying(&state->search, MPC_STAGES, (HEAT_QUARTER_STEPS * MPC_STAGES) / 4);
+    mpc_costate_scan(&state->search);
 }
 
 /* The point to try, with multipliers of the right sign: so far on the way to the aim, or beyond. One
  * of the coolant ends at 0 where it would change its sign. */
 static void go_towards(mpc_state *state, int32_t tried)
 {
-    const mpc_costate_term *const term = state->search.term;
     const mpc_search *const search = &state->search;
     const mpc_real of_heat =
         pick((search->moved == MPC_MOVES_CHARGE) ? 1 : 0, REAL(0.0), search->share);
     const mpc_real of_charge =
         pick((search->moved == MPC_MOVES_HEAT) ? 1 : 0, REAL(0.0), search->share);
     const mpc_real slack = state->cal.slack_g_per_k;
-    mpc_real after = REAL(0.0); /* price of the next stage, times its decay */
+    int32_t met = search->met;
     for (int32_t k = MPC_STAGES - 1; k >= 0; k--) {
         mpc_stage *const stage = &state->stage[k];
         const mpc_costate_dual *const here = &stage->dual[1 - tried];
         mpc_costate_dual *const there = &stage->dual[tried];
-        const mpc_real jump = term[k].price - after;
+        const int32_t is_met = (search->stretch[met].at == (k + 1)) ? 1 : 0;
+        const mpc_real jump = (mpc_real)is_met * search->stretch[met].jump;
         const mpc_real goal = real_clip(jump + stage->given_heat, -slack, slack);
         const mpc_real heat = here->heat + (of_heat * (goal - here->heat));
         const mpc_real charge = here->charge + (of_charge * (stage->goal_charge - here->charge));
@@ -124,7 +125,7 @@ static void go_towards(mpc_state *state, int32_t tried)
         const mpc_real greatest = pick(here->heat < REAL(0.0), REAL(0.0), slack);
         there->heat = real_clip(heat, least, greatest);
         there->charge = real_max(charge, REAL(0.0));
-        after = term[k].price * stage->p.decay;
+        met -= is_met;
     }
 }
 

@@ -9,9 +9,7 @@
 #include "mpc_model.h"
 #include "mpc_real.h"
 
-/* Costate of the coolant, backwards; returns the terms of the rows and limits that no variable of a
- * stage is in, g. */
-static mpc_real price_coolant(mpc_state *state, int32_t which)
+void mpc_costate_price(mpc_state *state, int32_t which)
 {
     mpc_real sum = REAL(0.0);
     mpc_real next = REAL(0.0);  /* lambda of the next stage */
@@ -35,7 +33,8 @@ static mpc_real price_coolant(mpc_state *state, int32_t which)
         sum -= dual->nu * p->of.settled;
         next = dual->charge;
     }
-    return sum;
+    state->search.constant_g[which] = sum;
+    mpc_costate_minimise(state, which);
 }
 
 #if MPC_STARTS
@@ -195,10 +194,8 @@ static void go_on(mpc_stage *stage, int32_t which, mpc_real starts_g, way *at)
                   + (share * (difference - (REAL(0.5) * p->width * rest)));
 }
 
-void mpc_costate_dual_at(mpc_state *state, int32_t which)
+void mpc_costate_share(mpc_state *state, int32_t which)
 {
-    const mpc_real constant_g = price_coolant(state, which);
-    mpc_costate_minimise(state, which);
     price_starts(state, which);
 #if MPC_STARTS
     way at = {REAL(0.0), REAL(0.0), REAL(0.0), (mpc_real)state->watch.good.engine_on};
@@ -208,6 +205,5 @@ void mpc_costate_dual_at(mpc_state *state, int32_t which)
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         go_on(&state->stage[k], which, state->search.term[k].price, &at);
     }
-    state->search.constant_g[which] = constant_g;
-    state->search.value[which] = at.cost_g + constant_g;
+    state->search.value[which] = at.cost_g + state->search.constant_g[which];
 }

@@ -1,10 +1,9 @@
 /* A running sum kept within limits at least cost: the prices of its terms, in one walk.
  *
- * x_k = d_k x_{k-1} + offset_k + response_k p_k, x before the first = 0. Along a stretch the price
- * goes on, d_k p_k = p_{k-1}, and each limit is an interval of prices; where their common interval
- * becomes empty the stretch ends at the limit that made its nearer bound, and the walk goes on from
- * there; it ends at once where the limits leave one value alone. It has a fixed number of steps,
- * those after the end without effect.
+ * x_k = x_{k-1} + offset_k + response_k p_k, x before the first = 0. Along a stretch the price goes on,
+ * and each limit is an interval of prices; where their common interval becomes empty the stretch ends
+ * at the limit that made its nearer bound, and the walk goes on from there; it ends at once where the
+ * limits leave one value alone. It has a fixed number of steps, those after the end without effect.
  *
  * The same in Python, with the derivation: qpmpc/costate/funnel.py.
  */
@@ -25,14 +24,12 @@ static inline mpc_real surely_above(mpc_real a, mpc_real b)
 static void put_end(mpc_costate_term *end)
 {
     const mpc_costate_term zero = {
-        REAL(0.0), ENDLESS_RESPONSE, {REAL(0.0), REAL(0.0)}, {REAL(0.0), REAL(0.0)}, REAL(1.0),
-        REAL(0.0), MPC_NO_PRICE};
+        REAL(0.0), ENDLESS_RESPONSE, {REAL(0.0), REAL(0.0)}, MPC_NO_PRICE};
     *end = zero;
 }
 
-/* Both kinds of walk; the compiler knows whether the terms decay. Places are counted in mpc_real,
- * which holds them exactly, so that choices are arithmetic. */
-static inline void walk(mpc_search *search, int32_t count, int32_t steps, int32_t decays)
+/* Places are counted in mpc_real, which holds them exactly, so that choices are arithmetic. */
+void mpc_costate_funnel(mpc_search *search, int32_t count, int32_t steps)
 {
     mpc_costate_term *const term = search->term;
     const mpc_real last = (mpc_real)count;
@@ -45,13 +42,7 @@ static inline void walk(mpc_search *search, int32_t count, int32_t steps, int32_
     mpc_real k = REAL(0.0);
     put_end(&term[count]);
     for (int32_t step = 0; step < steps; step++) {
-        mpc_costate_term *const own = &term[(int32_t)k];
-        if (decays != 0) {
-            x *= own->decay;
-            moves *= own->decay * own->decay;
-            least = real_max(least / own->decay, -UNLIMITED);
-            most = real_min(most / own->decay, UNLIMITED);
-        }
+        const mpc_costate_term *const own = &term[(int32_t)k];
         x += own->offset;
         moves += own->response;
         const mpc_real movable = above(moves, LEAST_RESPONSE);
@@ -69,39 +60,17 @@ static inline void walk(mpc_search *search, int32_t count, int32_t steps, int32_
         const mpc_real at = real_min(least_at, most_at);
         const int32_t by_most = (most_at < least_at) ? 1 : 0;
         mpc_costate_term *const older = &term[(int32_t)at];
-        mpc_real price = pick(by_most, most, least);
-        if (decays != 0) {
-            own->bound[0] = low;
-            own->bound[1] = high;
-            price = older->bound[by_most];
-        }
-        older->price = price + (goes_on * MPC_NO_PRICE);
+        older->price = pick(by_most, most, least) + (goes_on * MPC_NO_PRICE);
         x = (goes_on * x) + (ended * older->limit[by_most]);
         moves *= goes_on;
         least = (goes_on * least) - (ended * UNLIMITED);
         most = (goes_on * most) + (ended * UNLIMITED);
         k = real_min((k - (ended * (k - at))) + REAL(1.0), last);
     }
-    /* Of a walk cut short, the rest has the price that meets the limits seen, or that given where
-     * terms decay; the walk has come to the end if the term beyond the last has its price. */
+    /* of a walk cut short, the rest has the price that meets the limits seen */
     mpc_real price = real_max(least, real_min(most, REAL(0.0)));
-    int32_t reached = (term[count].price < UNLIMITED) ? 1 : 0;
-    price *= (decays != 0) ? (mpc_real)reached : REAL(1.0);
     for (int32_t i = count - 1; i >= 0; i--) {
-        const int32_t ends = (term[i].price < UNLIMITED) ? 1 : 0;
-        price = pick(ends, term[i].price, price);
-        reached |= ends;
-        term[i].price = (decays != 0) ? pick(reached, price, term[i].beyond) : price;
-        price *= (decays != 0) ? term[i].decay : REAL(1.0);
+        price = pick((term[i].price < UNLIMITED) ? 1 : 0, term[i].price, price);
+        term[i].price = price;
     }
-}
-
-void mpc_costate_funnel(mpc_search *search, int32_t count, int32_t steps)
-{
-    walk(search, count, steps, 0);
-}
-
-void mpc_costate_funnel_decaying(mpc_search *search, int32_t count, int32_t steps)
-{
-    walk(search, count, steps, 1);
 }

@@ -5,8 +5,9 @@
 #include "mpc_parts.h"
 #include "mpc_real.h"
 
-/* mpc_costate_program.c */
+/* mpc_costate_program.c: all of it but W; that, by what the search begins with */
 void mpc_costate_program_fill(mpc_state *state);
+void mpc_costate_smooth(mpc_state *state);
 
 /* mpc_costate_stage.c: all stages minimised with the envelope of f, which is found there too; one
  * with f itself */
@@ -14,14 +15,19 @@ void mpc_costate_minimise(mpc_state *state, int32_t which);
 mpc_real mpc_costate_shared_fuel(mpc_real power_w);
 void mpc_costate_minimise_exactly(mpc_stage *stage, int32_t which);
 
-/* mpc_costate_funnel.c: prices of the first terms, in `price`, where they do not decay and where
- * they do; MPC_NO_PRICE has to be there before */
+/* mpc_costate_funnel.c: prices of the first terms, in `price`; MPC_NO_PRICE has to be there before */
 #define MPC_NO_PRICE (REAL(2.0) * UNLIMITED)
 void mpc_costate_funnel(mpc_search *search, int32_t count, int32_t steps);
-void mpc_costate_funnel_decaying(mpc_search *search, int32_t count, int32_t steps);
 
-/* mpc_costate_dual.c: evaluate the dual `which` at its multipliers */
-void mpc_costate_dual_at(mpc_state *state, int32_t which);
+/* mpc_costate_scan.c: multipliers of the limits of the terms 1 to MPC_STAGES in `stretch`, which are
+ * then the stretches between those that are met, up to `met`, each `at` its last term, in `jump` */
+void mpc_costate_scan(mpc_search *search);
+
+/* mpc_costate_dual.c: evaluate the dual `which` at its multipliers: the costates that follow from them,
+ * with all stages minimised and the terms that no stage has; then the on-shares, where they lead, and
+ * the value */
+void mpc_costate_price(mpc_state *state, int32_t which);
+void mpc_costate_share(mpc_state *state, int32_t which);
 
 /* mpc_costate_aim.c: multipliers on the way to the aim, into the dual `tried` */
 void mpc_costate_try(mpc_state *state, int32_t tried);

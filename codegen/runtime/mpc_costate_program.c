@@ -30,7 +30,6 @@ static void put_no_part(mpc_stage *stage)
 void mpc_costate_program_fill(mpc_state *state)
 {
     const mpc_calibration cal = state->cal; /* a copy, which nothing else can change */
-    const mpc_real per_usual = REAL(1.0) / (cal.fuel_scale * mpc_par.usual_charge_g);
     mpc_stage_sums sums = {REAL(0.0)};
 #if MPC_STARTS
     mpc_real free_before = REAL(1.0);
@@ -65,16 +64,27 @@ void mpc_costate_program_fill(mpc_state *state)
         }
         const mpc_real per_s = pick((road->duration_s > REAL(1.0)) ? 1 : 0,
                                     cal.search_long_switch_g_per_s, cal.search_switch_g_per_s);
-        const mpc_real charge_g = state->stage[k].y[MPC_ROW_CHARGE];
-        const mpc_real worth = real_clip(charge_g * per_usual, LEAST_WORTH, REAL(1.0));
-        p->width = real_max(per_s * road->duration_s * free * worth, LEAST_SWITCH_G);
-        p->per_width = REAL(1.0) / p->width;
-        const mpc_real background = BACKGROUND * p->per_width;
+        p->widest = real_max(per_s * road->duration_s * free, LEAST_SWITCH_G);
+        const mpc_real background = BACKGROUND / p->widest;
         const mpc_real takes = free * p->of.charge_per_w * mpc_par.moderate_w;
         const mpc_real warms = free
                                * ((p->of.per_fuel * mpc_par.moderate_g_per_s)
                                   - (p->of.per_power * mpc_par.moderate_w));
         p->least_of_charge = background * takes * takes;
         p->least_of_heat = background * warms * warms;
+    }
+}
+
+void mpc_costate_smooth(mpc_state *state)
+{
+    const mpc_real per_usual =
+        REAL(1.0) / (state->cal.fuel_scale * mpc_par.usual_charge_g * mpc_par.moderate_w);
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
+        mpc_costate_program *const p = &state->stage[k].p;
+        const mpc_costate_dual *const dual = &state->stage[k].dual[0];
+        const mpc_real worth = dual->charge * dual->drive[MPC_FREE].power_w * per_usual;
+        const mpc_real part = real_clip(worth, LEAST_WORTH, REAL(1.0));
+        p->width = real_max(p->widest * part, LEAST_SWITCH_G);
+        p->per_width = REAL(1.0) / p->width;
     }
 }

@@ -11,16 +11,6 @@
 /* All memory of this method is in the state: there is nothing to claim. */
 void mpc_method_claim(const mpc_state *state) { (void)state; }
 
-/* What a limit of the coolant cost in the last plan; nothing if that has left it. The last one stays. */
-static mpc_real heat_near(const mpc_stage *stage)
-{
-    const mpc_real heat = stage->y[MPC_ROW_HEAT];
-    const mpc_real t_cl_k = stage->x[MPC_VAR_T_CL];
-    const mpc_real inside_k =
-        pick((heat > REAL(0.0)) ? 1 : 0, t_cl_k - stage->p.of.t_low, stage->p.of.t_high - t_cl_k);
-    return pick((inside_k > NEAR_K) ? 1 : 0, REAL(0.0), heat);
-}
-
 /* The search is sound, or will be started anew. */
 int32_t mpc_method_check(const mpc_state *state)
 {
@@ -34,7 +24,6 @@ int32_t mpc_method_check(const mpc_state *state)
 void mpc_method_start(mpc_state *state)
 {
     mpc_search *const search = &state->search;
-    mpc_stage *const last = &state->stage[MPC_STAGES - 1];
     mpc_costate_program_fill(state);
     search->here = 0;
     search->streak = 0;
@@ -43,10 +32,11 @@ void mpc_method_start(mpc_state *state)
     for (int32_t k = 0; k < MPC_STAGES; k++) {
         mpc_stage *const stage = &state->stage[k];
         stage->dual[0].charge = stage->y[MPC_ROW_CHARGE];
-        stage->dual[0].heat = heat_near(stage);
+        stage->dual[0].heat = stage->y[MPC_ROW_HEAT];
     }
-    last->dual[0].heat = last->y[MPC_ROW_HEAT];
-    mpc_costate_dual_at(state, 0);
+    mpc_costate_price(state, 0);
+    mpc_costate_smooth(state);
+    mpc_costate_share(state, 0);
 }
 
 int32_t mpc_method_iterate(mpc_state *state, int32_t count)
@@ -55,7 +45,8 @@ int32_t mpc_method_iterate(mpc_state *state, int32_t count)
     for (int32_t n = 0; n < count; n++) {
         const int32_t tried = 1 - search->here;
         mpc_costate_try(state, tried);
-        mpc_costate_dual_at(state, tried);
+        mpc_costate_price(state, tried);
+        mpc_costate_share(state, tried);
         const mpc_real rise = search->value[tried] - search->value[search->here];
         const int32_t rises = (rise > state->cal.search_least_rise_g) ? 1 : 0;
         const int32_t streak = (search->streak < STREAK) ? (search->streak + 1) : STREAK;

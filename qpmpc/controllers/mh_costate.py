@@ -12,7 +12,7 @@ from qpmpc.controllers.ramp import RampFloor
 from qpmpc.controllers.receding_horizon import Plan, Planner
 from qpmpc.controllers.settings import SettingsLike
 from qpmpc.costate.certificate import Followed, Layout, choose, follow, violation_price_g
-from qpmpc.costate.dual import Dual, Multipliers, StageCosts, stage_prices
+from qpmpc.costate.dual import Dual, Multipliers, StageCosts, smoothed, stage_prices
 from qpmpc.costate.path import Shortest
 from qpmpc.costate.program import USUAL_CHARGE, Program, ProgramBuilder, unit_g
 from qpmpc.costate.solve import newton
@@ -211,8 +211,7 @@ class MhCostate(Planner):
         rounds: int,
     ) -> CostatePlan:
         state = (seen.soc, seen.t_cl_degc, about, seen.engine_on)
-        program = self.programs.at(stages, *state, start.charge)
-        start = start.near(program, about.t_cl_end_degc)
+        program = smoothed(self.programs.at(stages, *state), start)
         found = newton(program, start, rounds, self._most_charge_g)
         layout = Layout.of(stages, self._horizon, self._shortest, seen.engine_for_s)
         exact = StageCosts.of(program, found.at, program.curves)

@@ -1,12 +1,12 @@
 """The smoothed dual of the stage program: its value, slopes and curvature at given multipliers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.costate.funnel import funnel
-from qpmpc.costate.program import Program
+from qpmpc.costate.program import LEAST_SWITCH_G, LEAST_WORTH, Program, moderate
 from qpmpc.pwa.curves import Curves
 from qpmpc.pwa.priced import Least, StagePrices, least, least_convex
 
@@ -15,7 +15,6 @@ Floats = NDArray[np.float64]
 START_QUARTER_STEPS = 12  # of the funnel, a quarter of those a stage has
 
 EDGE = 1e-6  # of sigma (1 - sigma): as near to 0 or 1 a share may be there, but for rounding
-NEAR_K = 1.0  # of a coolant limit: a plan that is further from it has left it
 
 
 @dataclass(frozen=True)
@@ -43,25 +42,6 @@ class Multipliers:
             self.charge + share * (other.charge - self.charge),
             np.where(self.heat * heat < 0.0, 0.0, heat),
         )
-
-    def near(self, program: Program, t_cl_degc: Floats) -> "Multipliers":
-        """Return these without the multipliers of coolant limits that a plan has left.
-
-        A limit that has a multiplier is aimed at from either side (`solve`). Of one that the road
-        has left meanwhile that aim is wrong, and all others with it: no round may rise any more.
-        That of the last stage stays. It is the price of heat for the whole trip, and a plan rounded
-        to whole seconds may well end a kelvin off.
-
-        Parameters
-        ----------
-        program : of the second
-        t_cl_degc : coolant temperature at the end of each stage, as planned last, shape (n,)
-        """
-        above = t_cl_degc > program.t_low + NEAR_K
-        below = t_cl_degc < program.t_high - NEAR_K
-        has_left = np.where(self.heat > 0.0, above, below)
-        has_left[-1] = False
-        return Multipliers(self.charge, np.where(has_left, 0.0, self.heat))
 
 
 def with_signs(at: Multipliers, slack_g_per_k: float) -> Multipliers:
@@ -181,6 +161,31 @@ class Dual:
     charge_curvature: Floats
     cross_curvature: Floats
     heat_curvature: Floats
+
+
+def smoothed(program: Program, at: Multipliers) -> Program:
+    """Return a program with the W of each stage by what a search begins with.
+
+    The seconds of a stage differ by what they ask of the battery, P0, and so do their costs of on
+    against off: by lambda (l'(P0 - E) - l'(P0)) a watt, which is lambda times a power E of the
+    engine, as losses are nearly quadratic. Where heat makes a charge cheap, and where the engine
+    idles for heat, the seconds are alike:
+
+        W = h s min(max(lambda E / (lambda_usual E_moderate), `LEAST_WORTH`), 1)
+
+    with s of a second or of a longer stage, where starts cost something or nothing, and E at these
+    prices.
+
+    Parameters
+    ----------
+    program : of the second
+    at : multipliers of the limits
+    """
+    p = program
+    power_w = StageCosts.of(p, at, p.shared).on.power_w
+    usual_w = p.usual_charge_g * moderate(p.curves)[0]
+    worth = np.clip(at.charge * power_w / usual_w, LEAST_WORTH, 1.0)
+    return replace(p, width=np.maximum(p.widest * worth, LEAST_SWITCH_G))
 
 
 def constant_part(program: Program, at: Multipliers, nu: Floats) -> float:

@@ -1,8 +1,8 @@
 """A running sum kept within limits at least cost: the prices of its terms, in one walk.
 
-The charge of the battery, the heat of the coolant and the starts of the engine are all of this
-form; see docs/costate.md. The generated C takes the same steps in the same order
-(`mpc_costate_funnel.c`), as many of them as are allowed, always.
+The charge of the battery and the starts of the engine are of this form; see docs/costate.md. The
+generated C takes the same steps in the same order (`mpc_costate_funnel.c`), as many of them as are
+allowed, always.
 """
 
 from typing import NamedTuple
@@ -17,77 +17,54 @@ UNLIMITED = 1e30  # a price beyond any
 ENDLESS_RESPONSE = 1e20  # of a term after the last: its limit leaves the price 0 alone
 
 
-def funnel(
-    offset: Floats,
-    response: Floats,
-    low: Floats,
-    high: Floats,
-    decay: Floats | None = None,
-    *,
-    steps: int,
-    beyond: Floats | None = None,
-) -> Floats:
+def funnel(offset: Floats, response: Floats, low: Floats, high: Floats, *, steps: int) -> Floats:
     """Return the price of each term of a running sum.
 
     The terms are offset_k + response_k p_k, those of
 
         min  sum_k 1/2 response_k p_k^2   subject to   low_k <= x_k <= high_k,
-        x_k = d_k x_{k-1} + offset_k + response_k p_k,   x before the first = 0.
+        x_k = x_{k-1} + offset_k + response_k p_k,   x before the first = 0.
 
-    The price d_k p_k = p_{k-1} goes on from term to term, and is 0 after the last, but falls where
-    the sum is at a lower limit and rises where it is at an upper one. So along a stretch of one
-    price every limit is an interval of prices. Walked forward, the interval [L, U] that meets all
-    limits so far is kept; where a new limit empties it, the stretch ends at the limit that made U
-    (or L), which fixes its price, and the walk starts again from there. A limit that no price can
-    move is passed over. The stretch ends at once where a limit leaves one price alone. Where the
-    steps do not suffice the last stretch has the price that meets the limits seen, or those that
-    are given.
+    The price p_k = p_{k-1} goes on from term to term, and is 0 after the last, but falls where the
+    sum is at a lower limit and rises where it is at an upper one. So along a stretch of one price
+    every limit is an interval of prices. Walked forward, the interval [L, U] that meets all limits
+    so far is kept; where a new limit empties it, the stretch ends at the limit that made U (or L),
+    which fixes its price, and the walk starts again from there. A limit that no price can move is
+    passed over. The stretch ends at once where a limit leaves one price alone. Where the steps do
+    not suffice the last stretch has the price that meets the limits seen.
 
     Parameters
     ----------
     offset, response, low, high : shape (n,); response >= 0, low <= high
-    decay : d_k > 0, shape (n,); 1 if None
     steps : of the walk; going back to where a stretch ends costs some
-    beyond : prices of the terms after the last stretch that a walk cut short has ended, shape (n,)
 
     Returns
     -------
     p, shape (n,)
     """
-    count = len(offset)
-    decays = np.ones(count) if decay is None else decay
     # one term more, which leaves the price 0 alone: where that is met, the walk ends
     terms = zip(
         [*offset.tolist(), 0.0],
         [*response.tolist(), ENDLESS_RESPONSE],
         [*low.tolist(), 0.0],
         [*high.tolist(), 0.0],
-        [*decays.tolist(), 1.0],
-        [*(1.0 / decays).tolist(), 1.0],
         strict=True,
     )
-    ends, rest = _ends([Term(*term) for term in terms], steps)
-    reached = count
-    if beyond is not None and count not in ends:
-        reached, rest = 1 + max(ends, default=-1), 0.0
-    price, found = rest, []
-    for k in range(reached - 1, -1, -1):
+    ends, price = _ends([Term(*term) for term in terms], steps)
+    found = []
+    for k in range(len(offset) - 1, -1, -1):
         price = ends.get(k, price)
         found.append(price)
-        price *= decays[k]
-    prices = np.array(found[::-1])
-    return prices if beyond is None else np.append(prices, beyond[reached:])
+    return np.array(found[::-1])
 
 
 class Term(NamedTuple):
-    """A term, its limits, and how x and its price go on to it."""
+    """A term and its limits."""
 
     offset: float
     response: float
     low: float
     high: float
-    decay: float
-    per_decay: float
 
 
 class Bound(NamedTuple):
@@ -110,10 +87,8 @@ def _ends(terms: list[Term], steps: int) -> tuple[dict[int, float], float]:
     of_least = of_most = NO_BOUND
     for _ in range(steps):
         term = terms[k]
-        x = term.decay * x + term.offset
-        moves = term.decay * term.decay * moves + term.response
-        least = max(least * term.per_decay, -UNLIMITED)
-        most = min(most * term.per_decay, UNLIMITED)
+        x += term.offset
+        moves += term.response
         can_move = moves > LEAST_RESPONSE
         per_move = 1.0 / max(moves, LEAST_RESPONSE)
         low = (term.low - x) * per_move if can_move else -UNLIMITED

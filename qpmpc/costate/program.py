@@ -49,8 +49,9 @@ _PROGRAM_CODE = code_of(parsed(PROGRAM))
 SWITCH_G_PER_S, LONG_SWITCH_G_PER_S = 0.03, 0.05
 START_SWITCH_G_PER_S, START_LONG_SWITCH_G_PER_S = 0.01, 0.015
 LEAST_SWITCH_G = 1e-4  # of a masked stage, or one in which a charge is worth next to nothing
-LEAST_WORTH = 0.1  # of these costs, where a charge is worth nearly nothing
+LEAST_WORTH = 0.1  # of these costs, where a charge is worth nearly nothing, or the engine idles
 USUAL_CHARGE = 1.3  # lambda of a usual trip, in fuel of the engine at its best
+MODERATE = 0.15  # of the engine's power
 
 
 def switches_g_per_s(has_start: bool) -> tuple[float, float]:
@@ -65,6 +66,12 @@ def unit_g(model: PwaModel) -> float:
     line = model.line
     best_g_per_j = float((line.fuel_g_per_s[1:] / line.power_w[1:]).min())
     return best_g_per_j * model.battery_energy_j
+
+
+def moderate(curves: Curves) -> tuple[float, float]:
+    """Return a moderate power of the engine, W, and the fuel that it takes, g/s."""
+    power_w = MODERATE * curves.end_w[-1:]
+    return float(power_w[0]), float(curves.fuel_g_per_s(power_w)[0])
 
 
 @dataclass(frozen=True)
@@ -101,6 +108,8 @@ class Program:
     starts_on : engine state now
     rises : see `Stages`; of sigma, and so fewer by the share without a choice
     width : W, cost of on against off over which the search smoothes the switch, g
+    widest : the most that it is, and as made
+    usual_charge_g : lambda of a usual trip
     soc, t_cl_degc : state now, scalars
     """
 
@@ -139,6 +148,8 @@ class Program:
     starts_on: bool
     rises: Floats
     width: Floats
+    widest: Floats
+    usual_charge_g: float
     soc: float
     t_cl_degc: float
 
@@ -183,22 +194,8 @@ class ProgramBuilder:
         t_cl_degc: float,
         about: Linearisation,
         engine_on: bool,
-        charge_g: Floats | None = None,
     ) -> Program:
-        """Return the program of a horizon and a state, expanded about a plan.
-
-        The seconds of a stage differ by what they ask of the battery, and that is worth lambda:
-        where heat makes a charge cheap, their costs of on against off differ less too,
-
-            W = h s min(max(lambda / lambda_usual, `LEAST_WORTH`), 1)
-
-        with s of a second or of a longer stage, where starts cost something or nothing.
-
-        Parameters
-        ----------
-        stages, soc, t_cl_degc, about, engine_on : of the second
-        charge_g : lambda of each stage by the last plan, shape (n,); as usual if None
-        """
+        """Return the program of a horizon and a state, expanded about a plan."""
         names = self._quantities.update(stages, soc, about, engine_on)
         exec(_PROGRAM_CODE, names)
         number = self._parameters
@@ -214,10 +211,9 @@ class ProgramBuilder:
         forced = np.where(must, 0.0, stages.must_share)
         rises = stages.rises * (1.0 - forced)
         rises[1:] *= 1.0 - forced[:-1]
-        usual_g = np.full(count, self._usual_g) if charge_g is None else charge_g
-        worth = np.clip(usual_g / self._usual_g, LEAST_WORTH, 1.0)
         second, longer = switches_g_per_s(self._has_start)
         width = np.where(stages.duration_s > 1.0, longer, second) * stages.duration_s
+        widest = np.maximum(width * (1.0 - forced), LEAST_SWITCH_G)
         price_t = growing.copy()
         price_t[:-1] += growing[1:]
         return Program(
@@ -238,7 +234,9 @@ class ProgramBuilder:
             cranking_soc=number["cranking_j"] / number["battery_energy_j"],
             starts_on=engine_on,
             rises=rises,
-            width=np.maximum(width * (1.0 - forced) * worth, LEAST_SWITCH_G),
+            width=widest,
+            widest=widest,
+            usual_charge_g=self._usual_g,
             soc=soc,
             t_cl_degc=t_cl_degc,
             **of,

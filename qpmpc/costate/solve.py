@@ -1,23 +1,20 @@
-"""Rounds of Newton on the dual, each with all limits solved exactly by two funnels."""
+"""Rounds of Newton on the dual, each with all limits solved exactly: a funnel and a scan."""
 
 from collections.abc import Callable
-from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpmpc.costate.dual import Dual, Multipliers, dual, with_signs
-from qpmpc.costate.funnel import funnel
-from qpmpc.costate.program import Program
-from qpmpc.pwa.curves import Curves
+from qpmpc.costate.funnel import LEAST_RESPONSE, funnel
+from qpmpc.costate.program import Program, moderate
+from qpmpc.costate.scan import scan
 
 Floats = NDArray[np.float64]
 
-# Steps of the funnels, a quarter of those a term has.
-CHARGE_QUARTER_STEPS, HEAT_QUARTER_STEPS = 11, 5
+CHARGE_QUARTER_STEPS = 11  # of SOC's funnel, a quarter of those a term has
 LEAST_RISE_G = 1e-7  # of the dual: less is as good as none
 BACKGROUND = 0.05  # share of a switch's curvature that a stage has that does not respond now
-MODERATE = 0.15  # of the engine's power
 LEAST_DECAY = 0.02  # of the coolant over a stage, in the search alone
 AT_SLACK = 0.999  # of the slack's price: from there on a coolant limit is given up
 # Of the way to the aim: the part that is tried first, and what becomes of it where the dual rose
@@ -69,12 +66,6 @@ def newton(
     return here
 
 
-def moderate(curves: Curves) -> tuple[float, float]:
-    """Return a moderate power of the engine, W, and the fuel that it takes, g/s."""
-    power_w = MODERATE * curves.end_w[-1:]
-    return float(power_w[0]), float(curves.fuel_g_per_s(power_w)[0])
-
-
 def aim(program: Program, here: Dual, most_charge: float, moved: int = BOTH) -> Multipliers:
     """Solve the problem linearised at a point, first for SOC, then for the coolant.
 
@@ -83,7 +74,7 @@ def aim(program: Program, here: Dual, most_charge: float, moved: int = BOTH) -> 
     p, at = program, here.at
     # of a stage that does not respond now: of switching an engine at a moderate power
     moderate_w, fuel = moderate(p.curves)
-    background = BACKGROUND / p.width
+    background = BACKGROUND / p.widest
     of_charge = here.charge_curvature + background * (p.free * p.charge_per_w * moderate_w) ** 2
     warms = p.free * (p.per_fuel * fuel - p.per_power * moderate_w)
     of_heat = here.heat_curvature + background * warms**2
@@ -103,29 +94,25 @@ def _heat(program: Program, here: Dual, of_heat: Floats, charge: Floats) -> Floa
     """Return multipliers of the coolant limits, given lambda.
 
     How much T_k moves is a running sum, with the decay of a stage. Its price is
-    M_k = nu_k t_end_k, but for a known part of `price_t`. A limit whose multiplier is the price of
-    its slack, and is not kept all the same, is a limit no more. One that has a multiplier now is
-    aimed at, from either side: so a stretch ends there at once, where else the walk would look for
-    a later limit up to the end of the trip and come back, from each of them. If that was wrong, the
-    multiplier changes its sign on the way, and the limit is an ordinary one in the next round.
+    M_k = nu_k t_end_k, but for a known part of `price_t`. Of a stage's two limits the one that has
+    a multiplier counts, else the nearer. A limit whose multiplier is the price of its slack, and is
+    not kept all the same, is a limit no more; nor is that of a stage that gives no heat, which is
+    empty, or shares the limit of the one before.
     """
     p, slack, heat = program, program.slack_g_per_k, here.at.heat
     decay = np.maximum(-p.t_before / p.t_end, LEAST_DECAY)
     low, high = p.t_low - here.t_cl_degc, p.t_high - here.t_cl_degc
     too_cold = (heat >= AT_SLACK * slack) & (low > 0.0)
     too_hot = (heat <= -AT_SLACK * slack) & (high < 0.0)
-    low, high = np.where(heat < 0.0, high, low), np.where(heat > 0.0, low, high)
-    low, high = np.where(too_cold, -inf, low), np.where(too_hot, inf, high)
+    is_low = (heat > 0.0) | ((heat == 0.0) & (low + high >= 0.0))
     given = slack * (too_cold.astype(float) - too_hot)
     more = here.cross_curvature * (charge - here.at.charge)
     response = of_heat / p.t_end**2
-    now = _sums(heat - given, decay)
-    offset = more / p.t_end - response * now
-    steps = HEAT_QUARTER_STEPS * len(decay) // 4
-    price = funnel(offset, response, low, high, decay, steps=steps, beyond=now)
-    jump = price - np.append(decay[1:] * price[1:], 0.0)
-    found: Floats = np.clip(jump + given, -slack, slack)
-    return found
+    is_none = too_cold | too_hot | (response < LEAST_RESPONSE)
+    side = np.where(is_none, 0.0, np.where(is_low, 1.0, -1.0))
+    offset = more / p.t_end - response * _sums(heat - given, decay)
+    found = scan(offset, response, np.where(is_low, low, high), side, decay)
+    return np.clip(found + given, -slack, slack)
 
 
 def _sums(heat: Floats, decay: Floats) -> Floats:

@@ -21,6 +21,7 @@ from qpmpc.controllers.mh_costate import MhCostate
 from qpmpc.controllers.receding_horizon import RecedingHorizon
 from qpmpc.controllers.settings import ControllerSettings
 from qpmpc.costate.funnel import UNLIMITED, funnel
+from qpmpc.costate.scan import scan
 from qpmpc.errors import InputError
 from qpmpc.faults.models import as_faults
 from qpmpc.registry import make_controller
@@ -104,22 +105,53 @@ def test_the_funnel_takes_the_steps_of_python(library, data):
     offset, response = rng.uniform(-1, 1, n), rng.uniform(0, 2, n) * (rng.random(n) < 0.7)
     low = np.where(rng.random(n) < 0.5, -1e3, rng.uniform(-2, 0, n))
     high = np.where(low < -10, 1e3, low + rng.uniform(0, 2, n) * (rng.random(n) < 0.8))
-    decay, beyond = rng.uniform(0.3, 1, n), rng.uniform(-3, 3, n)
-
-    def prices(walk, decay):
-        """Columns of a term: offset, response, limits, two bounds, decay, beyond, price."""
-        of_road = offset, response, low, high
-        rows = np.vstack([*of_road, np.zeros((2, n)), decay, beyond, np.full(n, NO_PRICE)]).T
-        terms = np.zeros((library.values.sizes.stages + 2, rows.shape[1]))
-        terms[:n] = rows
-        walk(terms.ctypes.data_as(ctypes.c_void_p), n, steps)
-        return terms[:n, -1]
-
-    found = prices(library.functions.mpc_costate_funnel_decaying, decay)
-    expected = funnel(offset, response, low, high, decay, steps=steps, beyond=beyond)
-    np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8)
-    found = prices(library.functions.mpc_costate_funnel, np.ones(n))
+    terms = np.zeros((n + 1, 5))  # columns of a term: offset, response, limits, price
+    terms[:n] = np.vstack([offset, response, low, high, np.full(n, NO_PRICE)]).T
+    library.functions.mpc_costate_funnel(terms.ctypes.data_as(ctypes.c_void_p), n, steps)
     expected = funnel(offset, response, low, high, steps=steps)
+    np.testing.assert_allclose(terms[:n, -1], expected, rtol=1e-8, atol=1e-8)
+
+
+class Stretch(ctypes.Structure):
+    """`mpc_costate_stretch`."""
+
+    _fields_ = [
+        *(
+            (name, ctypes.c_double)
+            for name in ["offset", "response", "decay", "limit", "side", "price", "jump"]
+        ),
+        ("at", ctypes.c_int32),
+    ]
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.data())
+def test_the_scan_takes_the_steps_of_python(library, data):
+    """Also with limits of both kinds, and terms that no price moves."""
+    n = library.values.sizes.stages
+
+    class Search(ctypes.Structure):
+        """The head of `mpc_search`."""
+
+        _fields_ = [
+            ("term", ctypes.c_double * 5 * (n + 1)),
+            ("stretch", Stretch * (n + 2)),
+            ("met", ctypes.c_int32),
+        ]
+
+    rng = np.random.default_rng(data.draw(st.integers(0, 10**6)))
+    offset, response = rng.uniform(-1, 1, n), rng.uniform(0, 2, n) * (rng.random(n) < 0.7)
+    limit, decay = rng.uniform(-2, 2, n), rng.uniform(0.3, 1, n)
+    shares = data.draw(st.sampled_from([(0.3, 0.7, 0.0), (0.3, 0.0, 0.7), (0.2, 0.4, 0.4)]))
+    side = rng.choice([0.0, 1.0, -1.0], n, p=shares)
+    search = Search()
+    for i, of in enumerate(zip(offset, response, decay, limit, side, strict=True)):
+        search.stretch[i + 1] = Stretch(*of)
+    library.functions.mpc_costate_scan(ctypes.byref(search))
+    found = np.zeros(n)
+    for own in search.stretch[1 : search.met + 1]:
+        found[own.at - 1] = own.jump
+    expected = scan(offset, response, limit, side, decay)
     np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8)
 
 

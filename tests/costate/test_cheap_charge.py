@@ -5,11 +5,10 @@ import pytest
 
 from qpmpc import Trip, load_vehicle, simulate
 from qpmpc.controllers.mh_costate import MhCostate
-from qpmpc.costate.program import LEAST_WORTH, USUAL_CHARGE, ProgramBuilder, unit_g
+from qpmpc.costate.dual import Multipliers, StageCosts, smoothed
+from qpmpc.costate.program import LEAST_WORTH, moderate
 from qpmpc.preview.stages import Stages
-from qpmpc.pwa import PwaModel
 from qpmpc.qp.linearisation import Linearisation
-from qpmpc.qp.settings import LimitSettings
 
 COLD = {"thermal.t_amb_degc": -9.065389, "trip.soc_init": 0.598668, "trip.t_cl_init_degc": 46.11028}
 RIDES = {
@@ -27,7 +26,8 @@ def trip_of(cycle: str, vehicle: str, start: dict[str, float]) -> Trip:
 def test_a_departure_in_the_cold_knows_what_a_charge_is_worth(vehicle, price_g) -> None:
     """Ten minutes at the lower coolant limit: dynamic programming's own price of SOC.
 
-    Smoothed as on a usual trip, where a charge is worth twice that, it was 21 and 17 % too high.
+    Smoothed as on a usual trip, where a charge is worth twice that and the engine gives power while
+    it runs, it was 21 and 17 % too high.
     """
     trip = trip_of("random-9312-592s", vehicle, COLD)
     controller = MhCostate(trip)
@@ -52,23 +52,31 @@ def test_the_price_of_heat_is_kept_where_a_rounded_plan_ends_a_kelvin_off(monkey
     assert np.ptp(np.log(under_way)) < np.log(1.3)
 
 
-def test_the_switch_is_smoothed_by_what_a_charge_is_worth() -> None:
+def test_the_switch_is_smoothed_by_what_the_engines_power_is_worth() -> None:
+    """By lambda E against that of a usual trip and a moderate power, between a tenth and all."""
     trip = trip_of("nycc", "paper-nimh", {})
     controller, seen = MhCostate(trip), trip.observation(0, trip.plant.initial_state())
     stages: Stages = controller.preview.at(0)
     count = len(stages.duration_s)
-    model = PwaModel.of(trip.vehicle)
-    layout = trip.vehicle, model, count, LimitSettings(), controller.preview.settings
     about = Linearisation.constant(count, seen.t_cl_degc)
-    usual_g = USUAL_CHARGE * unit_g(model)
+    program = controller.programs.at(stages, seen.soc, seen.t_cl_degc, about, False)
+    drives = stages.duration_s > 0.0
 
-    def width(share: float | None) -> np.ndarray:
-        charge_g = None if share is None else np.full(count, share * usual_g)
-        builder = ProgramBuilder(*layout)
-        return builder.at(stages, seen.soc, seen.t_cl_degc, about, False, charge_g).width
+    def parts(charge_share: float, heat_g_per_k: float) -> tuple[np.ndarray, np.ndarray]:
+        """W over the most that it is, and the power at these prices, of the stages."""
+        heat = np.zeros(count)
+        heat[-1] = heat_g_per_k
+        at = Multipliers(np.full(count, charge_share * program.usual_charge_g), heat)
+        power_w = StageCosts.of(program, at, program.shared).on.power_w
+        return (smoothed(program, at).width / program.widest)[drives], power_w[drives]
 
-    usual, drives = width(None), stages.duration_s > 0.0
-    np.testing.assert_array_equal(width(1.0), usual)
-    np.testing.assert_array_equal(width(3.0), usual)
-    np.testing.assert_allclose(width(0.4)[drives], 0.4 * usual[drives])
-    np.testing.assert_allclose(width(0.0)[drives], LEAST_WORTH * usual[drives])
+    moderate_w, _ = moderate(program.curves)
+    for charge_share, heat in ((1.0, 0.0), (3.0, 0.0), (0.5, 0.0), (0.5, 3.0), (0.2, 0.0)):
+        part, power_w = parts(charge_share, heat)
+        expected = np.clip(charge_share * power_w / moderate_w, LEAST_WORTH, 1.0)
+        np.testing.assert_allclose(part, expected)
+    # the cases tell: all of it on a usual trip in some stage, and a tenth where the engine idles
+    assert parts(1.0, 0.0)[0].max() == 1.0
+    idles = parts(0.2, 0.0)[1] < 1.0
+    assert idles.any()
+    np.testing.assert_allclose(parts(0.2, 0.0)[0][idles], LEAST_WORTH)
