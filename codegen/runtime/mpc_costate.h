@@ -96,7 +96,7 @@ typedef struct {
     mpc_real limit; /* of the sum after the last of them */
     mpc_real side;  /* 1 a lower limit, -1 an upper one, 0 none */
     mpc_real price; /* of a stretch whose limit is met, */
-    mpc_real jump;  /* that less the next one's: the limit's multiplier; */
+    mpc_real jump;  /* that less the next one's, decayed: the limit's multiplier; */
     int32_t at;     /* its last term, from 1 */
 } mpc_costate_stretch;
 

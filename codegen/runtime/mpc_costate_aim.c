@@ -1,5 +1,5 @@
 /* The aim of a round: the problem linearised where the search is, solved first for SOC, then for
- * the coolant, each with all its limits by a funnel. The same in Python: qpmpc/costate/solve.py.
+ * the coolant, with all their limits: by a funnel and by a scan. The same in Python: qpmpc/costate/solve.py.
  *
  * SOC is limited in each second and at the end of each block, so a block is one term. A coolant
  * limit whose multiplier would be more than the price of its slack gets that price, and is a limit
@@ -10,7 +10,7 @@
 #include "mpc_model.h"
 #include "mpc_real.h"
 
-#define DECIDES REAL(1.0e12) /* K a g/K: of a multiplier, against the distance of the limits */
+#define DECIDES REAL(1.0e12) /* K per (g/K): a multiplier of more than 1e-10 decides */
 #define SOC_TERMS (MPC_SHORT + MPC_BLOCKS)
 
 /* Some stages as one term. The response is that of the stages and, lest there be none, of one that

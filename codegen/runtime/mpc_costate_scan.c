@@ -3,8 +3,8 @@
  * x_k = d_k x_{k-1} + offset_k + response_k p_k, x before the first = 0. The price goes on,
  * d_k p_k = p_{k-1}, but for a jump at a limit that is met. Each term comes once; its limit is taken
  * to be met, by one price since the last that is. Where that leaves the last one a jump of the wrong
- * sign, that is not met, and two stretches become one. So as many steps as twice the terms suffice,
- * and those after the end have no effect.
+ * sign, that is not met, and two stretches become one. So steps of twice
+ * the terms and one suffice, and those after the end have no effect.
  *
  * The same in Python, with what it solves: qpmpc/costate/scan.py.
  */
@@ -15,12 +15,12 @@
 #define NONE 0
 #define END (MPC_STAGES + 1)
 
-/* The stretch before the first, which nothing takes away and which changes none that it joins, and the
- * term after the last, which moves so easily that its price is 0. */
+/* The stretch before the first, which has no limit, so that nothing takes it away, not even an infinite
+ * price, and changes none that it joins; the term after the last moves so easily that its price is 0. */
 static void put_ends(mpc_costate_stretch *stretch)
 {
     static const mpc_costate_stretch none = {REAL(0.0), REAL(0.0), REAL(1.0), REAL(0.0),
-                                             REAL(1.0), UNLIMITED, REAL(0.0), 0};
+                                             REAL(0.0), REAL(0.0), REAL(0.0), 0};
     static const mpc_costate_stretch end = {REAL(0.0), ENDLESS_RESPONSE, REAL(1.0), REAL(0.0),
                                             REAL(1.0), REAL(0.0),        REAL(0.0), 0};
     stretch[NONE] = none;

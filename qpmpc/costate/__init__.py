@@ -1,1 +1,1 @@
-"""The stage program by its costates: exact stages, limits by a funnel, a bound for nothing."""
+"""The stage program by its costates: exact stages, limits by funnel and scan, and a bound."""

@@ -108,7 +108,7 @@ class Program:
     starts_on : engine state now
     rises : see `Stages`; of sigma, and so fewer by the share without a choice
     width : W, cost of on against off over which the search smoothes the switch, g
-    widest : the most that it is, and as made
+    widest : the most that it is, h s; `width` is that until `smoothed`
     usual_charge_g : lambda of a usual trip
     soc, t_cl_degc : state now, scalars
     """

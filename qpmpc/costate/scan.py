@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from qpmpc.costate.funnel import ENDLESS_RESPONSE, LEAST_RESPONSE, UNLIMITED
+from qpmpc.costate.funnel import ENDLESS_RESPONSE, LEAST_RESPONSE
 
 Floats = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ def scan(offset: Floats, response: Floats, limit: Floats, side: Floats, decay: F
     -------
     m, shape (n,)
     """
-    none = Stretch(-1, 0.0, 0.0, 1.0, 0.0, 1.0, UNLIMITED)
+    none = Stretch(-1, 0.0, 0.0, 1.0, 0.0, 0.0)
     terms = zip(
         range(len(offset) + 1),
         [*offset.tolist(), 0.0],
@@ -63,7 +63,7 @@ def scan(offset: Floats, response: Floats, limit: Floats, side: Floats, decay: F
             misses = now.limit - now.decay * last.limit - now.offset
             price = misses / max(now.response, LEAST_RESPONSE)
             jump = last.price - now.decay * price
-            if last.side * jump >= 0.0:
+            if not last.side * jump < 0.0:  # as in C, also where a number is none
                 break
             now = met.pop().joined(now)
             found[last.at] = 0.0

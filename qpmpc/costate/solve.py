@@ -1,4 +1,4 @@
-"""Rounds of Newton on the dual, each with all limits solved exactly: a funnel and a scan."""
+"""Rounds of Newton on the dual, each with all limits at once: by a funnel and by a scan."""
 
 from collections.abc import Callable
 

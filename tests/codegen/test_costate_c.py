@@ -124,10 +124,8 @@ class Stretch(ctypes.Structure):
     ]
 
 
-@settings(deadline=None, max_examples=200)
-@given(st.data())
-def test_the_scan_takes_the_steps_of_python(library, data):
-    """Also with limits of both kinds, and terms that no price moves."""
+def scan_in_c(library, offset, response, limit, side, decay):
+    """Multipliers by the generated scan, and the last stretch whose limit is met."""
     n = library.values.sizes.stages
 
     class Search(ctypes.Structure):
@@ -139,11 +137,6 @@ def test_the_scan_takes_the_steps_of_python(library, data):
             ("met", ctypes.c_int32),
         ]
 
-    rng = np.random.default_rng(data.draw(st.integers(0, 10**6)))
-    offset, response = rng.uniform(-1, 1, n), rng.uniform(0, 2, n) * (rng.random(n) < 0.7)
-    limit, decay = rng.uniform(-2, 2, n), rng.uniform(0.3, 1, n)
-    shares = data.draw(st.sampled_from([(0.3, 0.7, 0.0), (0.3, 0.0, 0.7), (0.2, 0.4, 0.4)]))
-    side = rng.choice([0.0, 1.0, -1.0], n, p=shares)
     search = Search()
     for i, of in enumerate(zip(offset, response, decay, limit, side, strict=True)):
         search.stretch[i + 1] = Stretch(*of)
@@ -151,8 +144,47 @@ def test_the_scan_takes_the_steps_of_python(library, data):
     found = np.zeros(n)
     for own in search.stretch[1 : search.met + 1]:
         found[own.at - 1] = own.jump
-    expected = scan(offset, response, limit, side, decay)
-    np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8)
+    return found, search.met
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.data())
+def test_the_scan_takes_the_steps_of_python(library, data):
+    """Also with limits of both kinds, and terms that no price moves."""
+    n = library.values.sizes.stages
+    rng = np.random.default_rng(data.draw(st.integers(0, 10**6)))
+    offset, response = rng.uniform(-1, 1, n), rng.uniform(0, 2, n) * (rng.random(n) < 0.7)
+    limit, decay = rng.uniform(-2, 2, n), rng.uniform(0.3, 1, n)
+    shares = data.draw(st.sampled_from([(0.3, 0.7, 0.0), (0.3, 0.0, 0.7), (0.2, 0.4, 0.4)]))
+    side = np.where(response > 0.0, rng.choice([0.0, 1.0, -1.0], n, p=shares), 0.0)
+    problem = offset, response, limit, side, decay
+    found, _ = scan_in_c(library, *problem)
+    np.testing.assert_allclose(found, scan(*problem), rtol=1e-8, atol=1e-8)
+
+
+@pytest.mark.parametrize("met", [True, False])
+def test_the_scan_has_steps_enough(library, met):
+    """All limits are met, or all come and all go again, which takes each of its steps."""
+    n = library.values.sizes.stages
+    ones, decay = np.ones(n), np.full(n, 0.9)
+    limit = np.cumsum(decay ** np.arange(n)) if met else np.full(n, -5.0)  # x by a price of 1
+    found, last = scan_in_c(library, np.zeros(n), ones, limit, ones, decay)
+    np.testing.assert_allclose(found, scan(np.zeros(n), ones, limit, ones, decay), atol=1e-8)
+    assert (found > 0.0).all() if met else (found == 0.0).all()
+    assert last == (n if met else 0)
+
+
+@pytest.mark.parametrize("number", [1e31, 1e300, np.inf, -np.inf, np.nan])
+def test_no_number_leads_the_scan_out_of_its_memory(library, number):
+    """As by a flipped bit in the multipliers of the last second."""
+    n = library.values.sizes.stages
+    limit, ones, decay = np.full(n, -1.0), np.ones(n), np.full(n, 0.99)
+    for at in (0, n // 2, n - 1):
+        limit[at] = number
+        _, last = scan_in_c(library, np.zeros(n), 0.01 * ones, limit, ones, decay)
+        assert 0 <= last <= n
+        with np.errstate(all="ignore"):
+            assert len(scan(np.zeros(n), 0.01 * ones, limit, ones, decay)) == n
 
 
 @pytest.mark.parametrize("precision", ["f64", "f32"])

@@ -79,7 +79,7 @@ def test_the_search_goes_on_where_a_limit_was_that_the_plan_has_left():
     """A cold coolant near the arrival, after a stop at its lower limit.
 
     A block that had passed kept the multiplier of that limit, was aimed at, and no round rose:
-    fuel at the optimum's price of SOC was 5.2 % above it, and is 1.7 %.
+    fuel at the optimum's price of SOC was 5.2 % above it, and is not above it now.
     """
     start = {"thermal.t_amb_degc": 6.02, "trip.soc_init": 0.582, "trip.t_cl_init_degc": 46.245}
     ours, dp = (
@@ -87,7 +87,7 @@ def test_the_search_goes_on_where_a_limit_was_that_the_plan_has_left():
         for name, more in (("mh-costate", {}), ("dp", {"dp.grid": "quick"}))
     )
     spare_soc = ours.trajectory.soc[-1] - dp.trajectory.soc[-1]
-    assert ours.fuel_g - dp.soc_price_g * spare_soc < 1.04 * dp.fuel_g
+    assert ours.fuel_g - dp.soc_price_g * spare_soc < 1.01 * dp.fuel_g
 
 
 def test_the_plan_at_departure_expects_what_comes(pair):
