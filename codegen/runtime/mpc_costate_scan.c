@@ -52,6 +52,7 @@ void mpc_costate_scan(mpc_search *search)
     for (int32_t step = 0; step < ((2 * MPC_STAGES) + 1); step++) {
         mpc_costate_stretch *const last = &stretch[met];
         mpc_costate_stretch *const now = &stretch[met + 1];
+        const mpc_costate_stretch *const after = &stretch[k + 1];
         const mpc_real misses = (now->limit - (now->decay * last->limit)) - now->offset;
         const mpc_real price = misses / real_max(now->response, LEAST_RESPONSE);
         const mpc_real jump = last->price - (now->decay * price);
@@ -61,13 +62,13 @@ void mpc_costate_scan(mpc_search *search)
         const int32_t comes = ((k < END) ? 1 : 0) & (1 - goes); /* the next term */
         const int32_t meets = counts & comes;                   /* the present limit */
         const int32_t first = (goes * met) + ((comes - meets) * (met + 1));
-        const int32_t next = (comes != 0) ? (k + 1) : (met + 1);
+        const mpc_costate_stretch *const next = (comes != 0) ? after : now;
         last->jump = jump;
         now->price = price;
         now->at = k;
         k += comes;
         met += meets - goes;
-        join(&stretch[first], &stretch[next], &stretch[met + 1]);
+        join(&stretch[first], next, &stretch[met + 1]);
     }
     search->met = met;
 }
