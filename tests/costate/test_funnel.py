@@ -43,6 +43,7 @@ def test_prices_are_those_of_the_qp(problem):
         np.vstack([moves, -moves]),
         np.concatenate([high - bias, bias - low]),
         solver="daqp",
+        primal_tol=1e-10,  # a price may be off by that over the response, 0.05 at least
     )
     assert exact is not None
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from qpsolvers import solve_qp
 
@@ -44,6 +44,7 @@ def prices(multipliers, decay):
 
 @settings(deadline=None, max_examples=200)
 @given(problems())
+@example((np.array([0.5]), np.array([0.0546875]), np.array([0.49999945]), -np.ones(1), np.ones(1)))
 def test_multipliers_are_those_of_the_qp(problem):
     offset, response, limit, side, decay = problem
     found = scan(offset, response, limit, side, decay)
@@ -61,6 +62,7 @@ def test_multipliers_are_those_of_the_qp(problem):
         -side[:, None] * of * response,
         -side * (limit - of @ offset),
         solver="daqp",
+        primal_tol=1e-10,  # a price may be off by that over the response, 0.05 at least
     )
     assert exact is not None
     np.testing.assert_allclose(price, exact, atol=1e-5)
