@@ -17,8 +17,7 @@ mpc_real mpc_coming_least_w(const mpc_state *state, const mpc_prices *prices,
     least_w = real_max(least_w, mpc_last_start_w(state, prices, second));
     least_w = real_max(least_w, mpc_short_run_w(state, prices, on_share, second));
     least_w = real_max(least_w, mpc_battery_run_w(state, on_share, second));
-#else
-    (void)on_share;
 #endif
-    return real_max(least_w, mpc_heating_run_w(state, prices, power_w));
+    const int32_t is_planned = (on_share[0] >= state->cal.on_threshold) ? 1 : 0;
+    return real_max(least_w, mpc_heating_run_w(state, prices, power_w, is_planned));
 }

@@ -47,13 +47,16 @@ static mpc_real power_of(const mpc_state *state, mpc_real hot_w, mpc_real heat_w
     return power_w;
 }
 
-mpc_real mpc_heating_run_w(const mpc_state *state, const mpc_prices *prices, mpc_real power_w)
+mpc_real mpc_heating_run_w(const mpc_state *state, const mpc_prices *prices, mpc_real power_w,
+                           int32_t is_planned)
 {
     const mpc_calibration *const cal = &state->cal;
     const mpc_real t_cl_degc = state->watch.good.t_cl_degc;
     const mpc_real hot_w = mpc_map_cold_factor(t_cl_degc) * mpc_par.lhv_j_per_g;
     const mpc_real limit_degc = cal->t_cl_min_degc + T_CL_MARGIN_K;
     const mpc_real run_s = real_max((mpc_real)mpc_par.min_on_s, REAL(1.0));
+    const int32_t runs_anyway = ((MPC_STARTS == 0) && (is_planned != 0)) ? 1 : 0;
+    const mpc_real most_s = run_s + (mpc_real)runs_anyway;
     mpc_real lasts_degc = limit_degc;
     mpc_real must_s = REAL(0.0);
     mpc_real wanted_s = REAL(0.0);
@@ -68,8 +71,8 @@ mpc_real mpc_heating_run_w(const mpc_state *state, const mpc_prices *prices, mpc
     const mpc_measured *const good = &state->watch.good;
     const mpc_real held_s = (mpc_real)begun_s(good->engine_on, good->engine_for_s);
     const mpc_real lack_j = mpc_par.heat_capacity_j_per_k * (lasts_degc - t_cl_degc);
-    const int32_t is_lacking = ((lack_j > REAL(0.0)) && (wanted_s <= run_s) && (held_s <= REAL(1.0))
-                                && ((must_s - held_s) <= MUST_LEAST_S))
+    const int32_t is_lacking = ((lack_j > REAL(0.0)) && (wanted_s <= most_s)
+                                && (held_s <= REAL(1.0)) && ((must_s - held_s) <= MUST_LEAST_S))
                                    ? 1
                                    : 0;
     const int32_t is_asked = ((mpc_par.polish != 0) && (is_lacking != 0)) ? 1 : 0;
@@ -83,7 +86,7 @@ mpc_real mpc_heating_run_w(const mpc_state *state, const mpc_prices *prices, mpc
     const int32_t is_cold = (rested_degc < limit_degc) ? 1 : 0;
     const int32_t engine_on = state->watch.good.engine_on;
     const int32_t goes_on = ((MPC_STARTS != 0) && (engine_on != 0)) ? 1 : 0;
-    const int32_t runs = (goes_on != 0) ? pays : is_cold;
+    const int32_t runs = (goes_on != 0) ? pays : (is_cold | runs_anyway);
 
     const mpc_real start_w = heat_engine_w(cal->start_fuel_g * mpc_par.lhv_j_per_g, REAL(0.0));
     const mpc_real others_j = start_w + ((run_s - REAL(1.0)) * one.heat_w);

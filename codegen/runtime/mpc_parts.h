@@ -93,7 +93,8 @@ mpc_real mpc_battery_run_w(const mpc_state *state, const mpc_real *on_share,
                            const mpc_going *second);
 mpc_real mpc_short_run_w(const mpc_state *state, const mpc_prices *prices, const mpc_real *on_share,
                          const mpc_going *second);
-mpc_real mpc_heating_run_w(const mpc_state *state, const mpc_prices *prices, mpc_real power_w);
+mpc_real mpc_heating_run_w(const mpc_state *state, const mpc_prices *prices, mpc_real power_w,
+                           int32_t is_planned);
 
 /* mpc_ramp.c: what the ramp asks of the coming second */
 mpc_real mpc_ramp_least_w(const mpc_state *state);

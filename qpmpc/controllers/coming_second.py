@@ -16,6 +16,7 @@ from qpmpc.controllers.empty_battery import empty_battery_w
 from qpmpc.controllers.full_battery import full_battery_w
 from qpmpc.controllers.heating_run import heating_run_w
 from qpmpc.controllers.last_run import last_run_w, last_start_w
+from qpmpc.controllers.realise import ON_THRESHOLD
 from qpmpc.controllers.short_run import short_run_w
 from qpmpc.preview.stages import Stages
 from qpmpc.pwa.curves import Curves
@@ -85,5 +86,6 @@ def least_w(
         asked_w = [last_start_w(*plan, coming.internal_w), short_run_w(*plan, shares)]
     battery_w = battery_run_w(vehicle, maps, going, stages, shares, seen)
     store = coming.store_g_per_j
-    heat_w = heating_run_w(vehicle, curves, power_w, store, stages, coming.on_share, seen)
+    of_plan = (stages, coming.on_share, bool(shares[0] >= ON_THRESHOLD))
+    heat_w = heating_run_w(vehicle, curves, power_w, store, *of_plan, seen)
     return max(ramp_w, empty_w, battery_w, heat_w, *asked_w)

@@ -44,6 +44,7 @@ def heating_run_w(
     store_g_per_j: float,
     stages: Stages,
     on_share: NDArray[np.float64],
+    is_planned: bool,
     seen: Observation,
 ) -> float:
     """Return the power at which the engine runs for the heat that is missing; 0 if it need not.
@@ -56,18 +57,20 @@ def heating_run_w(
     It loses more the warmer it is: by the losses at the limit three minutes from 44 degC would seem
     to end 0.2 K warmer. Nothing is done unless J > 0, the plan wants no whole run,
     sum_k h_k sigma_k <= b, the shortest one or 1 s, and no second ahead has to run anyway, but the
-    last of a shortest run that is under way.
+    last of a shortest run that is under way. Where starts are free and the plan runs the engine in
+    the coming second, it may want one second more.
 
     With m and Q the fuel and the heat of the coming second at its least-cost power E, and c the
     fuel of a start, a run whose start cost something goes on at E if that burns no more than one
     more, J / Q <= b + c / m.
 
-    Such a second, and one in which the coolant would leave its limit without the engine, ends
-    what is missing, if it can. A start gives Q_s by itself and Q in each of the other b - 1 seconds
-    of its run: left are J' = J - Q_s - (b - 1) Q + C `BEYOND_K`. Where that is more than Q and
-    less than 2 Q, the power is E' = Q^-1(J') instead, if it costs no more than two seconds at E:
-    d(E') <= 2 d(E), with d(P) = alpha f(P) - w_G (l(P0) - l(P0 - P)), and engine, ramp and the
-    battery's charging allow it.
+    Such a second, one of a free engine that the plan runs in it, and one in which the coolant would
+    leave its limit without the engine, ends what is missing, if it can. A start gives Q_s by itself
+    and Q in each of the other b - 1 seconds of its run: left are J' = J - Q_s - (b - 1) Q +
+    C `BEYOND_K`. Where that is more than Q and less than 2 Q, the power is E' = Q^-1(J') instead,
+    if it costs no more than two seconds at E: d(E') <= 2 d(E), with
+    d(P) = alpha f(P) - w_G (l(P0) - l(P0 - P)), and engine, ramp and the battery's charging allow
+    it.
 
     Parameters
     ----------
@@ -77,6 +80,7 @@ def heating_run_w(
     store_g_per_j : w_G, what a joule of the battery's store costs in it
     stages : of the plan, from now on
     on_share : sigma of each stage by the plan, shape (n,)
+    is_planned : whether the plan runs the engine in the coming second
     seen : the present
     """
     engine, thermal, t_cl_degc = vehicle.engine, vehicle.thermal, seen.t_cl_degc
@@ -84,7 +88,10 @@ def heating_run_w(
     limit_degc = thermal.t_cl_min_degc + T_CL_MARGIN_K
     lack_j = thermal.heat_capacity_j_per_k * (_lasts_from_degc(thermal, stages) - t_cl_degc)
     held_s = begun_s(vehicle, seen.engine_on, seen.engine_for_s)
-    decides = held_s <= 1 and stages.must_s - held_s <= MUST_LEAST_S and wanted_s <= run_s
+    has_start = table_of(engine).has_start
+    runs_anyway = is_planned and not has_start
+    most_s = run_s + 1 if runs_anyway else run_s
+    decides = held_s <= 1 and stages.must_s - held_s <= MUST_LEAST_S and wanted_s <= most_s
     if lack_j <= 0.0 or not decides:
         return 0.0
     hot_w = alpha_at(vehicle.cold_engine, t_cl_degc) * engine.lhv_j_per_g
@@ -99,14 +106,15 @@ def heating_run_w(
 
     one = second(power_w)
     left_j = lack_j + BEYOND_K * thermal.heat_capacity_j_per_k
-    if seen.engine_on and table_of(engine).has_start:
+    if seen.engine_on and has_start:
         beyond_j = lack_j - run_s * one.heat_w
         if beyond_j * one.fuel_g > engine.start_fuel_g * one.heat_w:
             return 0.0
         least_w = max(power_w, IDLING_W)
     else:
         rested_k = STEP_S * cooling_w(thermal, t_cl_degc, float(stages.speed_mps[0]))
-        if t_cl_degc - rested_k / thermal.heat_capacity_j_per_k >= limit_degc:
+        is_cold = t_cl_degc - rested_k / thermal.heat_capacity_j_per_k < limit_degc
+        if not is_cold and not runs_anyway:
             return 0.0
         if not seen.engine_on:
             left_j -= engine_w(thermal, engine.start_fuel_g * engine.lhv_j_per_g, 0.0)
