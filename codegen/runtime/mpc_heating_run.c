@@ -55,7 +55,9 @@ mpc_real mpc_heating_run_w(const mpc_state *state, const mpc_prices *prices, mpc
     const mpc_real hot_w = mpc_map_cold_factor(t_cl_degc) * mpc_par.lhv_j_per_g;
     const mpc_real limit_degc = cal->t_cl_min_degc + T_CL_MARGIN_K;
     const mpc_real run_s = real_max((mpc_real)mpc_par.min_on_s, REAL(1.0));
-    const int32_t runs_anyway = ((MPC_STARTS == 0) && (is_planned != 0)) ? 1 : 0;
+    const int32_t engine_on = state->watch.good.engine_on;
+    const int32_t may = ((engine_on != 0) || (mpc_par.min_on_s <= 1)) ? 1 : 0;
+    const int32_t runs_anyway = ((MPC_STARTS == 0) && (is_planned != 0) && (may != 0)) ? 1 : 0;
     const mpc_real most_s = run_s + (mpc_real)runs_anyway;
     mpc_real lasts_degc = limit_degc;
     mpc_real must_s = REAL(0.0);
@@ -84,9 +86,9 @@ mpc_real mpc_heating_run_w(const mpc_state *state, const mpc_prices *prices, mpc
                                  - (heat_cooling_w(t_cl_degc, state->stage[0].road.speed_mps)
                                     / mpc_par.heat_capacity_j_per_k);
     const int32_t is_cold = (rested_degc < limit_degc) ? 1 : 0;
-    const int32_t engine_on = state->watch.good.engine_on;
     const int32_t goes_on = ((MPC_STARTS != 0) && (engine_on != 0)) ? 1 : 0;
-    const int32_t runs = (goes_on != 0) ? pays : (is_cold | runs_anyway);
+    const int32_t needs = ((is_cold != 0) || (runs_anyway != 0)) ? 1 : 0;
+    const int32_t runs = (goes_on != 0) ? pays : needs;
 
     const mpc_real start_w = heat_engine_w(cal->start_fuel_g * mpc_par.lhv_j_per_g, REAL(0.0));
     const mpc_real others_j = start_w + ((run_s - REAL(1.0)) * one.heat_w);

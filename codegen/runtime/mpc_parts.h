@@ -84,7 +84,7 @@ mpc_real mpc_coming_least_w(const mpc_state *state, const mpc_prices *prices,
  * time. mpc_battery_run.c: where one goes on or begins for what the battery lacks in the seconds ahead.
  * mpc_short_run.c: where one that is shorter than it may be begins before its time. These three of the
  * seconds of the short horizon with the engine on. mpc_heating_run.c: where a run goes on for the heat
- * that the coolant lacks, or one second gives all of it. */
+ * that the coolant lacks, or one second gives all of it; by whether the plan runs the engine in it. */
 mpc_real mpc_empty_battery_w(const mpc_state *state, mpc_real power_w, mpc_real ramp_w);
 mpc_real mpc_last_run_w(const mpc_state *state, const mpc_prices *prices, const mpc_going *now);
 mpc_real mpc_last_start_w(const mpc_state *state, const mpc_prices *prices,

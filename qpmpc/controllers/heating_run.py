@@ -57,20 +57,20 @@ def heating_run_w(
     It loses more the warmer it is: by the losses at the limit three minutes from 44 degC would seem
     to end 0.2 K warmer. Nothing is done unless J > 0, the plan wants no whole run,
     sum_k h_k sigma_k <= b, the shortest one or 1 s, and no second ahead has to run anyway, but the
-    last of a shortest run that is under way. Where starts are free and the plan runs the engine in
-    the coming second, it may want one second more.
+    last of a shortest run that is under way. Where starts cost nothing and the plan runs the engine
+    in the coming second, as the first of a run only where b = 1, it may want b + 1: it keeps a
+    margin, and so wants more than is missing.
 
     With m and Q the fuel and the heat of the coming second at its least-cost power E, and c the
     fuel of a start, a run whose start cost something goes on at E if that burns no more than one
     more, J / Q <= b + c / m.
 
-    Such a second, one of a free engine that the plan runs in it, and one in which the coolant would
-    leave its limit without the engine, ends what is missing, if it can. A start gives Q_s by itself
-    and Q in each of the other b - 1 seconds of its run: left are J' = J - Q_s - (b - 1) Q +
-    C `BEYOND_K`. Where that is more than Q and less than 2 Q, the power is E' = Q^-1(J') instead,
-    if it costs no more than two seconds at E: d(E') <= 2 d(E), with
-    d(P) = alpha f(P) - w_G (l(P0) - l(P0 - P)), and engine, ramp and the battery's charging allow
-    it.
+    Such a second, this one of a plan that runs the engine, and one in which the coolant would leave
+    its limit without it, ends what is missing, if it can. A start gives Q_s by itself and Q in each
+    of the other b - 1 seconds of its run: left are J' = J - Q_s - (b - 1) Q + C `BEYOND_K`. Where
+    that is more than Q and less than 2 Q, the power is E' = Q^-1(J') instead, if it costs no more
+    than two seconds at E: d(E') <= 2 d(E), with d(P) = alpha f(P) - w_G (l(P0) - l(P0 - P)), and
+    engine, ramp and the battery's charging allow it.
 
     Parameters
     ----------
@@ -89,7 +89,8 @@ def heating_run_w(
     lack_j = thermal.heat_capacity_j_per_k * (_lasts_from_degc(thermal, stages) - t_cl_degc)
     held_s = begun_s(vehicle, seen.engine_on, seen.engine_for_s)
     has_start = table_of(engine).has_start
-    runs_anyway = is_planned and not has_start
+    may = seen.engine_on or run_s == 1  # else the plan has to keep to a start, which it may not
+    runs_anyway = is_planned and may and not has_start
     most_s = run_s + 1 if runs_anyway else run_s
     decides = held_s <= 1 and stages.must_s - held_s <= MUST_LEAST_S and wanted_s <= most_s
     if lack_j <= 0.0 or not decides:

@@ -217,21 +217,33 @@ def test_a_second_that_a_free_engine_runs_in_anyway_ends_what_is_missing() -> No
 
     `judge-031` alternated between rest and idling, and its last second wasted 2.6 % of the fuel.
     """
-    left_s, lasts = 30, lasts_from_degc()
-    lack_k = 1.4 * heats_k(FREE, 0.0)
-    of_plan = {"car": FREE, "prices": POOR, "on_share": 1.6 / left_s}
-    ends_w = power_w(lasts - lack_k, is_planned=True, **of_plan)
-    assert heats_k(FREE, ends_w) == pytest.approx(lack_k + BEYOND_K, rel=0.01)
-    of_plan["on_share"] = 2.1 / left_s  # two whole seconds are left to the plan
-    assert power_w(lasts - lack_k, is_planned=True, **of_plan) == 0.0
-    of_plan["on_share"] = 1.6 / left_s
-    assert power_w(lasts - lack_k, **of_plan) == 0.0  # a second at rest is not made one that runs
-    for other in (0.9, 2.1):  # one second, or two at the least cost, are the plan's own
-        lack_k = other * heats_k(FREE, 0.0)
-        assert power_w(lasts - lack_k, is_planned=True, **of_plan) == 0.0
-    # where a start costs something a run that goes on has the rules above
-    same = [power_w(lasts - lack_k, prices=POOR, is_planned=p) for p in (False, True)]
-    assert same[0] == same[1]
+    left_s, lack_k = 30, 1.4 * heats_k(FREE, 0.0)
+    lacking = lasts_from_degc() - lack_k
+
+    def ends_w(wanted_s: float, is_planned: bool = True, **others) -> float:
+        shares = {"on_share": wanted_s / left_s, "is_planned": is_planned}
+        return power_w(lacking, left_s, **{"car": FREE, "prices": POOR, **shares, **others})
+
+    for wanted_s in (1.6, 2.0):
+        for engine_on in (True, False):
+            p_w = ends_w(wanted_s, engine_on=engine_on)
+            assert heats_k(FREE, p_w) == pytest.approx(lack_k + BEYOND_K, rel=0.01)
+    assert ends_w(2.1) == 0.0  # more than two seconds are left to the plan
+    assert ends_w(1.6, is_planned=False) == 0.0  # a second at rest is not made one that runs
+
+
+def test_a_second_that_runs_anyway_is_none_where_a_start_binds_or_costs() -> None:
+    """With a shortest run a share of one half is no start yet; a start that costs has its rules."""
+    left_s, idle_k = 30, heats_k(FREE, 0.0)
+    bound = FREE.with_settings({"engine.min_on_s": 4})
+    lacking = lasts_from_degc() - 4.4 * idle_k  # a start would give 3 of them anyhow
+    planned = {"prices": POOR, "is_planned": True, "on_share": 0.6 / left_s}
+    assert power_w(lacking, car=bound, polish=POLISH[FREE], engine_on=False, **planned) == 0.0
+    begun = lasts_from_degc() - 1.4 * idle_k
+    assert power_w(begun, car=bound, polish=POLISH[FREE], **planned) > 0.0
+    for on, wanted_s in ((True, CAR.engine.min_on_s + 0.5), (False, 0.6)):
+        of_plan = planned | {"on_share": wanted_s / left_s, "engine_on": on}
+        assert power_w(lasts_from_degc() - 1.4 * heats_k(CAR, 0.0), **of_plan) == 0.0
 
 
 def drive(
