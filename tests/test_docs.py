@@ -62,8 +62,10 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where the examples run, with the user's files that they mention."""
+    """Where the examples run, with the user's files that they mention, as in bash."""
     monkeypatch.chdir(tmp_path)
+    # the shell that runs the tests may be one without completion
+    monkeypatch.setattr("shellingham.detect_shell", lambda *_: ("bash", "/bin/bash"))
     car = files("qpmpc.vehicle").joinpath("data", "prius-liion.toml").read_text("utf-8")
     (tmp_path / "my_car.toml").write_text(car.replace("prius-liion", "my-car"))
     for _, text in [*blocks("toml"), *blocks("csv")]:
