@@ -55,10 +55,6 @@ mpc_real mpc_heating_run_w(const mpc_state *state, const mpc_prices *prices, mpc
     const mpc_real hot_w = mpc_map_cold_factor(t_cl_degc) * mpc_par.lhv_j_per_g;
     const mpc_real limit_degc = cal->t_cl_min_degc + T_CL_MARGIN_K;
     const mpc_real run_s = real_max((mpc_real)mpc_par.min_on_s, REAL(1.0));
-    const int32_t engine_on = state->watch.good.engine_on;
-    const int32_t may = ((engine_on != 0) || (mpc_par.min_on_s <= 1)) ? 1 : 0;
-    const int32_t runs_anyway = ((MPC_STARTS == 0) && (is_planned != 0) && (may != 0)) ? 1 : 0;
-    const mpc_real most_s = run_s + (mpc_real)runs_anyway;
     mpc_real lasts_degc = limit_degc;
     mpc_real must_s = REAL(0.0);
     mpc_real wanted_s = REAL(0.0);
@@ -71,7 +67,11 @@ mpc_real mpc_heating_run_w(const mpc_state *state, const mpc_prices *prices, mpc
         wanted_s += road->duration_s * real_max(state->stage[k].x[MPC_VAR_ON], REAL(0.0));
     }
     const mpc_measured *const good = &state->watch.good;
-    const mpc_real held_s = (mpc_real)begun_s(good->engine_on, good->engine_for_s);
+    const int32_t engine_on = good->engine_on;
+    const mpc_real held_s = (mpc_real)begun_s(engine_on, good->engine_for_s);
+    const int32_t may = ((engine_on != 0) || (mpc_par.min_on_s <= 1)) ? 1 : 0;
+    const int32_t runs_anyway = ((MPC_STARTS == 0) && (is_planned != 0) && (may != 0)) ? 1 : 0;
+    const mpc_real most_s = run_s + (mpc_real)runs_anyway;
     const mpc_real lack_j = mpc_par.heat_capacity_j_per_k * (lasts_degc - t_cl_degc);
     const int32_t is_lacking = ((lack_j > REAL(0.0)) && (wanted_s <= most_s)
                                 && (held_s <= REAL(1.0)) && ((must_s - held_s) <= MUST_LEAST_S))

@@ -65,12 +65,13 @@ def heating_run_w(
     fuel of a start, a run whose start cost something goes on at E if that burns no more than one
     more, J / Q <= b + c / m.
 
-    Such a second, this one of a plan that runs the engine, and one in which the coolant would leave
-    its limit without it, ends what is missing, if it can. A start gives Q_s by itself and Q in each
-    of the other b - 1 seconds of its run: left are J' = J - Q_s - (b - 1) Q + C `BEYOND_K`. Where
-    that is more than Q and less than 2 Q, the power is E' = Q^-1(J') instead, if it costs no more
-    than two seconds at E: d(E') <= 2 d(E), with d(P) = alpha f(P) - w_G (l(P0) - l(P0 - P)), and
-    engine, ramp and the battery's charging allow it.
+    A second of such a run, one in which the plan runs an engine that starts at no cost, and one in
+    which the coolant would leave its limit without it end what is missing, if they can. A start
+    gives Q_s by itself and Q in each of the other b - 1 seconds of its run: left are
+    J' = J - Q_s - (b - 1) Q + C `BEYOND_K`. Where that is more than Q and less than 2 Q, the power
+    is E' = Q^-1(J') instead, if it costs no more than two seconds at E: d(E') <= 2 d(E), with
+    d(P) = alpha f(P) - w_G (l(P0) - l(P0 - P)), and engine, ramp and the battery's charging allow
+    it.
 
     Parameters
     ----------
