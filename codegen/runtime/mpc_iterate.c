@@ -27,7 +27,7 @@ void mpc_iterate_clear(mpc_state *state)
 }
 
 /* Short stages move up by some seconds (in equal time); the last keeps its values; long stages
- * keep their place. What a limit of the coolant costs in a second is that second's own: it is not
+ * keep their place; so does the point that they are expanded about. What a limit of the coolant costs in a second is that second's own: it is not
  * there twice. */
 void mpc_iterate_shift(mpc_state *state, int32_t by)
 {
@@ -40,6 +40,11 @@ void mpc_iterate_shift(mpc_state *state, int32_t by)
         for (int32_t i = 0; i < MPC_ROWS; i++) {
             state->stage[k].y[i] = state->stage[from].y[i];
         }
+        mpc_stage_road *const road = &state->stage[k].road;
+        const mpc_stage_road *const of = &state->stage[from].road;
+        road->about_t_cl_end_degc = of->about_t_cl_end_degc;
+        road->about_fuel_g_per_s = of->about_fuel_g_per_s;
+        road->about_p_eng_w = of->about_p_eng_w;
 #if MPC_COSTATE
         mpc_real *const heat = &state->stage[k].y[MPC_ROW_HEAT];
         *heat = (later < MPC_SHORT) ? *heat : REAL(0.0);

@@ -41,6 +41,7 @@ void mpc_stages_take(mpc_state *state, const mpc_in *in);
 void mpc_stages_move_up(mpc_state *state, int32_t by);
 void mpc_stages_move_origin(mpc_state *state, mpc_real soc, mpc_real t_cl_degc);
 void mpc_stages_expand_cold(mpc_state *state);
+void mpc_stages_follow_plan(mpc_state *state);
 void mpc_stages_expand_about_plan(mpc_state *state);
 
 /* The method of planning, mpc_qp_method.c or mpc_costate_solve.c and mpc_costate_plan.c.

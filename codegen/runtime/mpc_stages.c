@@ -144,24 +144,45 @@ void mpc_stages_expand_cold(mpc_state *state)
     }
 }
 
-/* The last plan, in SI units. alpha is taken at the mean temperature of a stage's own ends, for
- * demand classes at that of their block's: the class that is driven first in the plan is in reality
- * spread over the block. */
+/* From the point of this second to the plan, in SI units: the next second's point. All of the way,
+ * or a part of it where the plan is that of a search that goes on from second to second: expanded
+ * about a plan that is far from the best, its program would be another one every second. */
+void mpc_stages_follow_plan(mpc_state *state)
+{
+#if MPC_COSTATE
+    const mpc_real part = (state->phase == MPC_PHASE_RUNNING) ? EXPANSION_STEP : REAL(1.0);
+#else
+    const mpc_real part = REAL(1.0);
+#endif
+    const mpc_real rest = REAL(1.0) - part;
+    for (int32_t k = 0; k < MPC_STAGES; k++) {
+        mpc_stage_road *const road = &state->stage[k].road;
+        const mpc_real *const x = state->stage[k].x;
+        const mpc_real end = state->origin_t_cl_degc + x[MPC_VAR_T_CL];
+        road->about_t_cl_end_degc = (rest * road->about_t_cl_end_degc) + (part * end);
+        road->about_fuel_g_per_s = (rest * road->about_fuel_g_per_s) + (part * x[MPC_VAR_FUEL]);
+        road->about_p_eng_w = (rest * road->about_p_eng_w) + (part * x[MPC_VAR_P_ENG]);
+    }
+}
+
+/* The point, moved up with the plan. alpha is taken at the mean temperature of a stage's own ends,
+ * for demand classes at that of their block's: the class that is driven first in the plan is in
+ * reality spread over the block. */
 void mpc_stages_expand_about_plan(mpc_state *state)
 {
     mpc_real start = real_clip(state->origin_t_cl_degc, COLDEST_DEGC, HOTTEST_DEGC);
     for (int32_t k = 0; k < MPC_STAGES; k++) {
-        mpc_stage *const stage = &state->stage[k];
-        stage->road.about_t_cl_start_degc = start;
-        stage->road.about_t_cl_end_degc =
-            real_clip(state->origin_t_cl_degc + stage->x[MPC_VAR_T_CL], COLDEST_DEGC, HOTTEST_DEGC);
-        stage->road.about_t_cl_degc = REAL(0.5) * (start + stage->road.about_t_cl_end_degc);
+        mpc_stage_road *const road = &state->stage[k].road;
+        road->about_t_cl_start_degc = start;
+        road->about_t_cl_end_degc =
+            real_clip(road->about_t_cl_end_degc, COLDEST_DEGC, HOTTEST_DEGC);
+        road->about_t_cl_degc = REAL(0.5) * (start + road->about_t_cl_end_degc);
         /* no usable solution is beyond the upper bounds, corrupted memory may be */
-        stage->road.about_fuel_g_per_s = real_clip(stage->x[MPC_VAR_FUEL], REAL(0.0),
-                                                   LARGEST_PLAUSIBLE * mpc_par.unit_fuel_g_per_s);
-        stage->road.about_p_eng_w =
-            real_clip(stage->x[MPC_VAR_P_ENG], REAL(0.0), LARGEST_PLAUSIBLE * mpc_par.unit_power_w);
-        start = stage->road.about_t_cl_end_degc;
+        road->about_fuel_g_per_s = real_clip(road->about_fuel_g_per_s, REAL(0.0),
+                                             LARGEST_PLAUSIBLE * mpc_par.unit_fuel_g_per_s);
+        road->about_p_eng_w =
+            real_clip(road->about_p_eng_w, REAL(0.0), LARGEST_PLAUSIBLE * mpc_par.unit_power_w);
+        start = road->about_t_cl_end_degc;
     }
     for (int32_t k = MPC_SHORT; k < MPC_STAGES; k += MPC_CLASSES) {
         mpc_stage *const block = &state->stage[k];

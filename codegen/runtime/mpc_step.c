@@ -54,6 +54,9 @@ static void prepare(mpc_state *state)
 static int32_t conclude(mpc_state *state, int32_t solved)
 {
     const int32_t usable = mpc_method_finish(state, solved);
+    if (usable != 0) {
+        mpc_stages_follow_plan(state);
+    }
     state->phase = (usable != 0) ? MPC_PHASE_RUNNING : MPC_PHASE_COLD;
     if (usable == 0) {
         state->solves = 0;

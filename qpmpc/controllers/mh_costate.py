@@ -31,7 +31,8 @@ from qpmpc.vehicle.engine_parameters import Engine
 Floats = NDArray[np.float64]
 
 DEPARTURE_LINEARISATIONS, DEPARTURE_ROUNDS = 5, 30
-ROUNDS, START_ROUNDS = 5, 4
+ROUNDS, START_ROUNDS = 3, 4
+EXPANSION_STEP = 0.2  # a second, of the way from what was expanded about to the plan
 MOST_CHARGE = 10.0  # the largest lambda allowed, in fuel of the engine at its best
 
 
@@ -43,8 +44,8 @@ class MhCostateSettings(BaseModel):
     horizon : layout of the stages, as of `mh_qp`, but `entry_share` is 0: blocks are apart
     limits : terminal band and margins, as of `mh_qp.qp`; it comes nearer to a limit than an
         iteration that is stopped, and needs less of a margin to it
-    rounds : Newton rounds of a second; if not given 5, or 4 where a start costs something: there a
-        round is more work, and a plan gains less by one more
+    rounds : Newton rounds of a second; if not given 3, or 4 where a start costs something: the search
+        goes on from second to second
     implementation : as of `mh_qp`
     """
 
@@ -137,6 +138,7 @@ class MhCostate(Planner):
         self._shortest = Shortest.of(vehicle.engine)
         self.last: CostatePlan | None = None
         self._last_step = 0
+        self._expands: Floats = np.empty(0)  # in x's columns, what the next second is expanded about
 
     def depart(self, seen: Observation) -> None:
         """Solve the program of departure, with several linearisations."""
@@ -147,7 +149,7 @@ class MhCostate(Planner):
         for _ in range(DEPARTURE_LINEARISATIONS):
             plan = self._solve(stages, seen, about, start, DEPARTURE_ROUNDS)
             about, start = self._about(plan.x, seen.t_cl_degc), plan.at
-        self.last, self._last_step = plan, seen.step
+        self.last, self._last_step, self._expands = plan, seen.step, plan.x
         self.expects = expectation(self.trip, self._horizon, self.model, stages, plan.x)
 
     def plan(self, seen: Observation) -> Plan:
@@ -175,11 +177,16 @@ class MhCostate(Planner):
         """Solve the program of this second, from the last plan, shifted along.
 
         Without one, as after a restart under way, from a guess: a round makes a usable plan of it.
+        The point of expansion follows the plan by `EXPANSION_STEP`: far from its best a plan may
+        have the thermostat open where it is closed, and the program about it would be another one
+        every second, whose search never ends.
         """
         stages = self.preview.ahead(seen.step, seen.engine_on, seen.engine_for_s)
         about, start = self._cold(seen.t_cl_degc)
+        part = 1.0
         if self.last is not None:
-            x, charge, heat = self.last.x, self.last.at.charge, self.last.at.heat
+            part = EXPANSION_STEP
+            x, charge, heat = self._expands, self.last.at.charge, self.last.at.heat
             for _ in range(seen.step - self._last_step):
                 x, charge, heat = x[self._shift], charge[self._shift], heat[self._shift]
                 heat[self._horizon.short_stages - 1] = 0.0  # a second's own: it is there once
@@ -187,6 +194,7 @@ class MhCostate(Planner):
         plan = self._solve(stages, seen, about, start, self._rounds)
         if not self.solver_fails:
             self.last, self._last_step = plan, seen.step
+            self._expands = about.towards(plan.x, part)
         return plan
 
     def forget(self) -> None:

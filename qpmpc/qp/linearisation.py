@@ -44,6 +44,24 @@ class Linearisation:
         t_cl = np.full(stages, t_cl_degc)
         return cls(t_cl, np.full(stages, fuel_g_per_s), np.full(stages, p_eng_w), t_cl, t_cl)
 
+    def towards(self, x: Floats, part: float) -> Floats:
+        """Return a plan whose columns that make a point are moved that part of the way from here.
+
+        Parameters
+        ----------
+        x : solution, SI units, shape (n, variables)
+        part : 1 returns the plan itself
+        """
+        of = {
+            Var.T_CL: self.t_cl_end_degc,
+            Var.FUEL: self.fuel_g_per_s,
+            Var.P_ENG: self.p_eng_w,
+        }
+        moved = x.copy()
+        for column, here in of.items():
+            moved[:, column] = (1.0 - part) * here + part * x[:, column]
+        return moved
+
     @classmethod
     def about(cls, x: Floats, t_cl_degc: float, layout: HorizonSettings) -> "Linearisation":
         """Return the point that a plan gives.
