@@ -44,8 +44,8 @@ class MhCostateSettings(BaseModel):
     horizon : layout of the stages, as of `mh_qp`, but `entry_share` is 0: blocks are apart
     limits : terminal band and margins, as of `mh_qp.qp`; it comes nearer to a limit than an
         iteration that is stopped, and needs less of a margin to it
-    rounds : Newton rounds of a second; if not given 3, or 4 where a start costs something: the search
-        goes on from second to second
+    rounds : Newton rounds of a second; if not given 3, or 4 where a start costs something; the
+        search goes on from second to second
     implementation : as of `mh_qp`
     """
 
@@ -138,7 +138,7 @@ class MhCostate(Planner):
         self._shortest = Shortest.of(vehicle.engine)
         self.last: CostatePlan | None = None
         self._last_step = 0
-        self._expands: Floats = np.empty(0)  # in x's columns, what the next second is expanded about
+        self._expands: Floats = np.empty(0)  # as `x`: what the next second is expanded about
 
     def depart(self, seen: Observation) -> None:
         """Solve the program of departure, with several linearisations."""
