@@ -14,6 +14,7 @@ mpc_real reader_prepare(mpc_state *state, const mpc_in *in, const mpc_real *x)
             state->stage[k].x[i] = x[(k * MPC_VARS) + i];
         }
     }
+    mpc_stages_follow_plan(state);
     state->phase = MPC_PHASE_RUNNING;
     prepare(state);
     state->phase = MPC_PHASE_DEPARTING; /* from here on the iterate is in the solver's units */
