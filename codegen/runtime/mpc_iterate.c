@@ -27,8 +27,8 @@ void mpc_iterate_clear(mpc_state *state)
 }
 
 /* Short stages move up by some seconds (in equal time); the last keeps its values; long stages
- * keep their place; so does the point that they are expanded about. What a limit of the coolant costs in a second is that second's own: it is not
- * there twice. */
+ * keep their place. So does the point that they are expanded about. What a limit of the coolant
+ * costs in a second is that second's own: it is not there twice. */
 void mpc_iterate_shift(mpc_state *state, int32_t by)
 {
     for (int32_t k = 0; k < (MPC_SHORT - 1); k++) {
