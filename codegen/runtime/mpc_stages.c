@@ -145,8 +145,8 @@ void mpc_stages_expand_cold(mpc_state *state)
 }
 
 /* From the point of this second to the plan, in SI units: the next second's point. All of the way,
- * or a part of it where the plan is that of a search that goes on from second to second: expanded
- * about a plan that is far from the best, its program would be another one every second. */
+ * or a part of it where the search goes on from second to second: about plans that are far from the
+ * best its program would be another one every second, and it would never catch up. */
 void mpc_stages_follow_plan(mpc_state *state)
 {
 #if MPC_COSTATE

@@ -179,7 +179,7 @@ class MhCostate(Planner):
         Without one, as after a restart under way, from a guess: a round makes a usable plan of it.
         The point of expansion follows the plan by `EXPANSION_STEP`: far from its best a plan may
         have the thermostat open where it is closed, and the program about it would be another one
-        every second, whose search never ends.
+        every second, which the search never catches up with.
         """
         stages = self.preview.ahead(seen.step, seen.engine_on, seen.engine_for_s)
         about, start = self._cold(seen.t_cl_degc)

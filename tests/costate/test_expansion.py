@@ -17,10 +17,6 @@ HEAVY = {  # 3.6 kW of cabin heat: limits of SOC and of the coolant in many long
 }
 
 
-def trip_of(cycle: str, vehicle: str, start: dict[str, float]) -> Trip:
-    return Trip(cycle, load_vehicle(vehicle).with_settings(start))
-
-
 def test_a_part_of_the_way_to_a_plan() -> None:
     here = Linearisation.constant(3, 50.0, fuel_g_per_s=0.4, p_eng_w=4000.0)
     x = np.arange(3.0 * len(Var)).reshape(3, -1)
@@ -35,7 +31,7 @@ def test_a_part_of_the_way_to_a_plan() -> None:
 
 
 def test_it_follows_the_plan_a_part_of_the_way_each_second_and_all_of_it_after_a_restart() -> None:
-    trip = trip_of("nycc", "prius-nimh", {})
+    trip = Trip("nycc", load_vehicle("prius-nimh"))
     controller, state = MhCostate(trip), trip.plant.initial_state()
     made, at = [], controller.programs.at
 
@@ -46,8 +42,7 @@ def test_it_follows_the_plan_a_part_of_the_way_each_second_and_all_of_it_after_a
     controller.programs.at = noted  # type: ignore[method-assign]
     plans = [controller.solve(trip.observation(step, state)).x for step in range(3)]
     long = slice(controller.preview.settings.short_stages, None)  # these keep their place
-    cold = np.full_like(plans[0][long, Var.P_ENG], state.t_cl_degc)
-    np.testing.assert_array_equal(made[0].t_cl_degc[long], cold)
+    np.testing.assert_array_equal(made[0].t_cl_degc[long], state.t_cl_degc)
     np.testing.assert_array_equal(made[1].p_eng_w[long], plans[0][long, Var.P_ENG])
     between = made[1].p_eng_w + EXPANSION_STEP * (plans[1][:, Var.P_ENG] - made[1].p_eng_w)
     np.testing.assert_allclose(made[2].p_eng_w[long], between[long], rtol=1e-12)
@@ -63,7 +58,7 @@ def test_the_search_catches_up_with_its_program(vehicle) -> None:
     stages in which it was closed: plans were 0.5 to 2 kg above their bound after two minutes, which
     itself went up and down by 100 g.
     """
-    trip = trip_of("random-9925-2209s", vehicle, HEAVY)
+    trip = Trip("random-9925-2209s", load_vehicle(vehicle).with_settings(HEAVY))
     controller, state = MhCostate(trip), trip.plant.initial_state()
     plans = [controller.solve(trip.observation(step, state)) for step in range(150)]
     last = plans[100:]
