@@ -30,7 +30,7 @@
 #if defined(MPC_NATIVE_MINMAX)
 static inline mpc_real real_min(mpc_real a, mpc_real b) { return REAL_FMIN(a, b); }
 static inline mpc_real real_max(mpc_real a, mpc_real b) { return REAL_FMAX(a, b); }
-#elif MPC_COSTATE && defined(__SSE2__)
+#elif MPC_COSTATE && defined(__SSE2__) && !defined(MPC_IN_LANES)
 /* the instructions of x86 for the same, which gcc makes of it in some places alone */
 #if MPC_F32
 static inline mpc_real real_min(mpc_real a, mpc_real b)

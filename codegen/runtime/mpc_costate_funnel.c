@@ -65,7 +65,8 @@ void mpc_costate_funnel(mpc_search *search, int32_t count, int32_t steps)
         moves *= goes_on;
         least = (goes_on * least) - (ended * UNLIMITED);
         most = (goes_on * most) + (ended * UNLIMITED);
-        k = real_min((k - (ended * (k - at))) + REAL(1.0), last);
+        const mpc_real next = (goes_on * (k + REAL(1.0))) + (ended * (at + REAL(1.0)));
+        k = real_min(next, last);
     }
     /* of a walk cut short, the rest has the price that meets the limits seen */
     mpc_real price = real_max(least, real_min(most, REAL(0.0)));

@@ -9,10 +9,11 @@
 void mpc_costate_program_fill(mpc_state *state);
 void mpc_costate_smooth(mpc_state *state);
 
-/* mpc_costate_stage.c: all stages minimised with the envelope of f, which is found there too; one
- * with f itself */
+/* mpc_costate_stage.c: all stages minimised with the envelope of f, which is found there too */
 void mpc_costate_minimise(mpc_state *state, int32_t which);
 mpc_real mpc_costate_shared_fuel(mpc_real power_w);
+
+/* mpc_costate_exact.c: one with f itself */
 void mpc_costate_minimise_exactly(mpc_stage *stage, int32_t which);
 
 /* mpc_costate_funnel.c: prices of the first terms, in `price`; MPC_NO_PRICE has to be there before */

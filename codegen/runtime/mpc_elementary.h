@@ -20,6 +20,9 @@
 extern const mpc_real mpc_fixed_fine[16];
 extern const mpc_real mpc_fixed_coarse[8];
 
+/* 1 / 1!, 1 / 2! and so on */
+extern const mpc_real mpc_fixed_per_factorial[MPC_EXP_TERMS];
+
 /* exp(x) = (1 + rest) scale */
 typedef struct {
     mpc_real rest;
@@ -33,11 +36,15 @@ static inline mpc_exponential exponential_of(mpc_real x)
     const int32_t times = (int32_t)halvings;
     const mpc_real whole = (mpc_real)times;
     const mpc_real r = (clipped + (whole * MPC_LN2_HIGH)) + (whole * MPC_LN2_LOW);
-    mpc_exponential found = {REAL(0.0),
-                             mpc_fixed_fine[times % 16] * mpc_fixed_coarse[(times / 16) % 8]};
-    for (int32_t i = MPC_EXP_TERMS; i > 0; i--) {
-        found.rest = (r * (REAL(1.0) + found.rest)) / (mpc_real)i;
+    const mpc_real square = r * r;
+    mpc_real even = REAL(0.0); /* powers of r, by their factorials: two sums, which do not wait */
+    mpc_real odd = REAL(0.0);
+    for (int32_t i = MPC_EXP_TERMS - 2; i >= 0; i -= 2) {
+        even = (even * square) + mpc_fixed_per_factorial[i];
+        odd = (odd * square) + mpc_fixed_per_factorial[i + 1];
     }
+    const mpc_exponential found = {r * (even + (r * odd)),
+                                   mpc_fixed_fine[times % 16] * mpc_fixed_coarse[(times / 16) % 8]};
     return found;
 }
 

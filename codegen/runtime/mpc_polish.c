@@ -60,9 +60,7 @@ static least_drive least_of(const mpc_state *state, const mpc_prices *paid, int3
     const mpc_real net_w = state->stage[k].road.net_w;
     const int32_t is_priced = ((paid->internal > REAL(0.0)) && (mpc_par.polish != 0)) ? 1 : 0;
     const mpc_real internal = pick(is_priced, paid->internal, REAL(1.0));
-    const mpc_real per = REAL(1.0) / real_max(internal, LEAST_PRICE);
-    const mpc_real fuel = LINE_SCALE * paid->fuel;
-    const stage_prices price = {fuel, paid->p_eng, internal, per, fuel * per, paid->p_eng * per};
+    const stage_prices price = prices_at(internal, LINE_SCALE * paid->fuel, paid->p_eng);
     const mpc_real least_w =
         real_max(mpc_par.engine_min_w, net_w - mpc_par.battery_discharge_max_w);
     const mpc_real most_w =

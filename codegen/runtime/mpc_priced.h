@@ -24,6 +24,13 @@ typedef struct {
     mpc_real power_ratio;
 } stage_prices;
 
+static inline stage_prices prices_at(mpc_real internal, mpc_real fuel, mpc_real power)
+{
+    const mpc_real per = REAL(1.0) / real_max(internal, LEAST_PRICE);
+    const stage_prices price = {fuel, power, internal, per, fuel * per, power * per};
+    return price;
+}
+
 /* r of a piece of this slope */
 static inline mpc_real ratio_at(const stage_prices *price, mpc_real slope)
 {
