@@ -15,8 +15,10 @@ from pathlib import Path
 
 from qpmpc.errors import QpmpcError
 
+# no number depends on these; without the latter two gcc makes no vectors of loops with choices
+ARITHMETIC = "-ffp-contract=off -fno-math-errno -fno-trapping-math"
 # -w: a new compiler's warnings must not stop a user; the tests check warnings
-COMPILE = "-O3 -std=c99 -w -ffp-contract=off -fno-math-errno -fno-trapping-math -fPIC -Iosqp -Iosqp/inc/public -Iosqp/inc/private"
+COMPILE = f"-O3 -std=c99 -w {ARITHMETIC} -fPIC -Iosqp -Iosqp/inc/public -Iosqp/inc/private"
 # of several loaded libraries each must call its own functions; macOS has it so by itself
 OWN_FUNCTIONS = "" if sys.platform == "darwin" else " -Wl,-Bsymbolic"
 FLAGS = f"{COMPILE} -shared{OWN_FUNCTIONS}"

@@ -40,18 +40,31 @@ def road() -> Cycle:
     return Cycle.from_samples("part", np.arange(121.0), nycc.speed_mps[180:301])
 
 
-def twin_of(trip: Trip) -> RecedingHorizon:
-    return RecedingHorizon(trip, MhCostate(trip))
+def twin_of(trip: Trip, settings: ControllerSettings | None = None) -> RecedingHorizon:
+    return RecedingHorizon(trip, MhCostate(trip, settings))
 
 
-@pytest.mark.parametrize("car", [*CARS, "prius-prime"])
-def test_every_decision_is_that_of_python(road, car):
-    """Also in the seconds after a restart, and with a coolant that is held at its upper limit."""
+@pytest.mark.parametrize(
+    ("car", "seconds", "blocks"),
+    [
+        ("paper-liion", 20, 20),
+        ("prius-nimh", 20, 20),
+        ("prius-prime", 20, 20),
+        ("prius-nimh", 23, 7),
+    ],
+)
+def test_every_decision_is_that_of_python(road, car, seconds, blocks):
+    """Also in the seconds after a restart, and with a coolant that is held at its upper limit.
+
+    23 stages and 21 after them leave lanes of the processor's vectors over, which have 20.
+    """
+    horizon = {"mh_costate.horizon.short_stages": seconds, "mh_costate.horizon.blocks": blocks}
+    chosen = ControllerSettings().with_settings(horizon)
     vehicle = load_vehicle(car)
     if car == "paper-liion":
         vehicle = vehicle.with_settings({"trip.t_cl_init_degc": 89.5})
     trip = Trip(road, vehicle)
-    ours, twin = GeneratedCostate(trip), twin_of(trip)
+    ours, twin = GeneratedCostate(trip, chosen), twin_of(trip, chosen)
     twin.depart()
     compared = []
 
