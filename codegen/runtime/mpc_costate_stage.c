@@ -22,7 +22,8 @@
 
 #define MOST_GIVEN REAL(1.0e30) /* finite where the price is nil */
 
-/* Some stages at the prices of a dual, see stage_prices and mpc_stage_program. */
+/* A part of some stages at the prices of a dual, see stage_prices, mpc_stage_program and
+ * mpc_costate_part. */
 typedef struct {
     mpc_stage *stage[LANES];
     mpc_costate_dual *dual[LANES];
@@ -35,10 +36,6 @@ typedef struct {
     mpc_real charge_per_w[LANES];
     mpc_real per_fuel[LANES];
     mpc_real per_power[LANES];
-} stages;
-
-/* One part of each, see mpc_costate_part. */
-typedef struct {
     mpc_real share[LANES];
     mpc_real net_w[LANES];
     mpc_real low_w[LANES];
@@ -71,14 +68,15 @@ static inline int32_t at_most(int32_t k, int32_t end)
 #endif
 }
 
-static inline stages take_stages(mpc_state *state, int32_t which, int32_t first, int32_t last)
+static inline parts take(mpc_state *state, int32_t which, int32_t first, int32_t last, int32_t part)
 {
-    stages of;
+    parts of;
     mpc_real charge[LANES];
     mpc_real nu[LANES];
     mpc_real fuel_cost[LANES];
     for (int32_t i = 0; i < LANES; i++) {
         mpc_stage *const stage = &state->stage[at_most(first + i, last)];
+        const mpc_costate_part *const own = &stage->p.part[part];
         of.stage[i] = stage;
         of.dual[i] = &stage->dual[which];
         charge[i] = of.dual[i]->charge;
@@ -87,6 +85,12 @@ static inline stages take_stages(mpc_state *state, int32_t which, int32_t first,
         of.charge_per_w[i] = stage->p.of.charge_per_w;
         of.per_fuel[i] = stage->p.of.per_fuel;
         of.per_power[i] = stage->p.of.per_power;
+        of.share[i] = own->share;
+        of.net_w[i] = own->net_w;
+        of.low_w[i] = own->low_w;
+        of.high_w[i] = own->high_w;
+        of.low_g_per_s[i] = own->low_g_per_s;
+        of.high_g_per_s[i] = own->high_g_per_s;
     }
     for (int32_t i = 0; i < LANES; i++) {
         const stage_prices price = prices_at(charge[i] * of.charge_per_w[i],
@@ -102,22 +106,7 @@ static inline stages take_stages(mpc_state *state, int32_t which, int32_t first,
     return of;
 }
 
-static inline parts take_parts(const stages *of, int32_t which)
-{
-    parts part;
-    for (int32_t i = 0; i < LANES; i++) {
-        const mpc_costate_part *const own = &of->stage[i]->p.part[which];
-        part.share[i] = own->share;
-        part.net_w[i] = own->net_w;
-        part.low_w[i] = own->low_w;
-        part.high_w[i] = own->high_w;
-        part.low_g_per_s[i] = own->low_g_per_s;
-        part.high_g_per_s[i] = own->high_g_per_s;
-    }
-    return part;
-}
-
-static inline stage_prices prices_in(const stages *of, int32_t i)
+static inline stage_prices prices_in(const parts *of, int32_t i)
 {
     const stage_prices price = {of->fuel[i], of->power[i],      of->internal[i],
                                 of->per[i],  of->fuel_ratio[i], of->power_ratio[i]};
@@ -130,7 +119,7 @@ enum { SLOPE = 0, END = 1, BEGIN = 2, INTERCEPT = 3, ROW = 4 };
 /* Rows of the pieces of the envelope that the least of all powers lies on, by bisection: the first
  * whose end it does not lie beyond. That is where the slope of l is below r there:
  * r^2 (1 - 4 R P / U^2) < 1. After the pieces come rows that nothing lies beyond. */
-static inline void find_rows(const stages *of, const parts *part, const mpc_real **row)
+static inline void find_rows(const parts *of, const mpc_real **row)
 {
     mpc_real slope[LANES];
     mpc_real end_w[LANES];
@@ -147,7 +136,7 @@ static inline void find_rows(const stages *of, const parts *part, const mpc_real
         for (int32_t i = 0; i < LANES; i++) {
             const stage_prices price = prices_in(of, i);
             const mpc_real ratio = ratio_at(&price, slope[i]);
-            beyond[i] = ratio * ratio * under_root(part->net_w[i] - end_w[i]);
+            beyond[i] = ratio * ratio * under_root(of->net_w[i] - end_w[i]);
         }
         for (int32_t i = 0; i < LANES; i++) {
             row[i] = (beyond[i] < REAL(1.0)) ? &row[i][stride * ROW] : row[i];
@@ -165,7 +154,7 @@ mpc_real mpc_costate_shared_fuel(mpc_real power_w)
 }
 
 /* The envelope rises and no line of it lies above it: so at a limit of E fuel is the greatest of three. */
-static inline answers minimise_shared(const stages *of, const parts *part)
+static inline answers minimise_shared(const parts *of)
 {
     answers answer;
     const mpc_real *row[LANES];
@@ -173,7 +162,7 @@ static inline answers minimise_shared(const stages *of, const parts *part)
     mpc_real begin_w[LANES];
     mpc_real intercept[LANES];
     const mpc_real steepest = mpc_par.shared[(((2 * MPC_SHARED_STRIDE) - 1) * ROW) + SLOPE];
-    find_rows(of, part, row);
+    find_rows(of, row);
     for (int32_t i = 0; i < LANES; i++) {
         slopes[i] = row[i][SLOPE];
         begin_w[i] = row[i][BEGIN];
@@ -181,9 +170,9 @@ static inline answers minimise_shared(const stages *of, const parts *part)
     }
     for (int32_t i = 0; i < LANES; i++) {
         const stage_prices price = prices_in(of, i);
-        const mpc_real net_w = part->net_w[i];
-        const mpc_real high_w = part->high_w[i];
-        const mpc_real share = part->share[i];
+        const mpc_real net_w = of->net_w[i];
+        const mpc_real high_w = of->high_w[i];
+        const mpc_real share = of->share[i];
         const mpc_real slope = slopes[i];
         const mpc_real ratio = ratio_at(&price, slope);
         const mpc_real inverse = REAL(1.0) / ratio;
@@ -191,13 +180,13 @@ static inline answers minimise_shared(const stages *of, const parts *part)
         const mpc_real quarter = quarter_w((ratio > REAL(1.0)) ? 1 : 0);
         const mpc_real own_w = stationary_w(net_w, ratio);
         const mpc_real free_w = real_max(own_w, begin_w[i]);
-        const mpc_real power_w = real_clip(free_w, part->low_w[i], high_w);
+        const mpc_real power_w = real_clip(free_w, of->low_w[i], high_w);
         const mpc_real given = REAL(2.0) * quarter * square * inverse * price.per;
         const mpc_real inside = (power_w == own_w) ? REAL(1.0) : REAL(0.0);
         const mpc_real gives = share * (inside * real_min(given, MOST_GIVEN));
         const mpc_real on_piece = (slope * power_w) + intercept[i];
-        const mpc_real from_high = part->high_g_per_s[i] - (steepest * (high_w - power_w));
-        const mpc_real fuel = real_max(real_max(on_piece, part->low_g_per_s[i]), from_high);
+        const mpc_real from_high = of->high_g_per_s[i] - (steepest * (high_w - power_w));
+        const mpc_real fuel = real_max(real_max(on_piece, of->low_g_per_s[i]), from_high);
         const mpc_real internal = internal_w(net_w - power_w);
         const mpc_real cost = (price.fuel * fuel) + (price.power * power_w)
                               + (price.internal * internal);
@@ -217,7 +206,7 @@ static inline answers minimise_shared(const stages *of, const parts *part)
     return answer;
 }
 
-static inline void give(const stages *of, const answers *found, int32_t part)
+static inline void give(const parts *of, const answers *found, int32_t part)
 {
     for (int32_t i = 0; i < LANES; i++) {
         mpc_costate_answer *const answer = &of->stage[i]->answer[part];
@@ -238,10 +227,9 @@ void mpc_costate_minimise(mpc_state *state, int32_t which)
     while (k < MPC_STAGES) {
         const int32_t end = (k < MPC_SHORT) ? MPC_SHORT : MPC_STAGES;
         const int32_t count = (k < MPC_SHORT) ? 1 : MPC_PARTS;
-        const stages of = take_stages(state, which, k, end - 1);
         for (int32_t i = 0; i < count; i++) {
-            const parts part = take_parts(&of, i);
-            const answers found = minimise_shared(&of, &part);
+            const parts of = take(state, which, k, end - 1, i);
+            const answers found = minimise_shared(&of);
             give(&of, &found, i);
         }
         k = at_most(k + LANES, end);
