@@ -58,7 +58,7 @@ typedef struct {
 } answers;
 
 /* A stage of this group, or where it ends. */
-static inline int32_t at_most(int32_t k, int32_t end)
+static inline int32_t same_group(int32_t k, int32_t end)
 {
 #if LANES > 1
     return (k < end) ? k : end;
@@ -68,14 +68,15 @@ static inline int32_t at_most(int32_t k, int32_t end)
 #endif
 }
 
-static inline parts take(mpc_state *state, int32_t which, int32_t first, int32_t last, int32_t part)
+static inline parts gather(mpc_state *state, int32_t which, int32_t first, int32_t last,
+                           int32_t part)
 {
     parts of;
     mpc_real charge[LANES];
     mpc_real nu[LANES];
     mpc_real fuel_cost[LANES];
     for (int32_t i = 0; i < LANES; i++) {
-        mpc_stage *const stage = &state->stage[at_most(first + i, last)];
+        mpc_stage *const stage = &state->stage[same_group(first + i, last)];
         const mpc_costate_part *const own = &stage->p.part[part];
         of.stage[i] = stage;
         of.dual[i] = &stage->dual[which];
@@ -228,10 +229,10 @@ void mpc_costate_minimise(mpc_state *state, int32_t which)
         const int32_t end = (k < MPC_SHORT) ? MPC_SHORT : MPC_STAGES;
         const int32_t count = (k < MPC_SHORT) ? 1 : MPC_PARTS;
         for (int32_t i = 0; i < count; i++) {
-            const parts of = take(state, which, k, end - 1, i);
+            const parts of = gather(state, which, k, end - 1, i);
             const answers found = minimise_shared(&of);
             give(&of, &found, i);
         }
-        k = at_most(k + LANES, end);
+        k = same_group(k + LANES, end);
     }
 }
