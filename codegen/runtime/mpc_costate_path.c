@@ -30,7 +30,7 @@ static mpc_real start_g(const mpc_costate_dual *cost)
 #endif
 }
 
-static mpc_real rises_of(const mpc_stage *stage)
+static mpc_real stage_rises(const mpc_stage *stage)
 {
 #if MPC_STARTS
     return stage->p.rises;
@@ -145,8 +145,8 @@ static mpc_real block_least(const mpc_stage *block, int32_t which)
         const mpc_stage *const stage = &block[i];
         const mpc_costate_dual *const cost = &stage->dual[which];
         /* from one stage to the next a class rises or falls: the first of a block does neither */
-        const mpc_real rising = start_g(cost) * real_max(rises_of(stage), REAL(0.0));
-        const mpc_real falling = start_g(cost) * real_max(-rises_of(stage), REAL(0.0));
+        const mpc_real rising = start_g(cost) * real_max(stage_rises(stage), REAL(0.0));
+        const mpc_real falling = start_g(cost) * real_max(-stage_rises(stage), REAL(0.0));
         const mpc_real to_on = real_min(on, off + rising);
         const mpc_real to_off = real_min(off, on + falling);
         on = to_on + cost->on_g[MPC_FREE] + (stage->p.cannot * FORBIDDEN_G);

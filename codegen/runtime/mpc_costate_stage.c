@@ -229,8 +229,10 @@ void mpc_costate_minimise(mpc_state *state, int32_t which)
         const int32_t end = (k < MPC_SHORT) ? MPC_SHORT : MPC_STAGES;
         const int32_t count = (k < MPC_SHORT) ? 1 : MPC_PARTS;
         for (int32_t i = 0; i < count; i++) {
-            const parts of = gather(state, which, k, end - 1, i);
-            const answers found = minimise_shared(&of);
+            parts of;
+            answers found;
+            of = gather(state, which, k, end - 1, i);
+            found = minimise_shared(&of);
             give(&of, &found, i);
         }
         k = same_group(k + LANES, end);
